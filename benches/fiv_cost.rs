@@ -321,9 +321,9 @@ fn turning(gpu: &Gpu, extent: [u32; 2], rounds: usize) -> Result<()> {
         };
         let ways: [fn(&Settings, f32) -> Settings; 4] = [
             |base, _| base.clone(),
-            |base, step| Settings { rotation: step, ..base.clone() },
+            |base, step| Settings { rotation: step, turning: 30.0, ..base.clone() },
             |base, step| Settings { exposure: 0.1 * step, ..base.clone() },
-            |base, step| Settings { rotation: step, negligible: 0.005, ..base.clone() },
+            |base, step| Settings { rotation: step, turning: 30.0, negligible: 0.005, ..base.clone() },
         ];
         let mut row = format!("{size:>11}");
         for (way, width) in ways.into_iter().zip([9, 9, 9, 10]) {

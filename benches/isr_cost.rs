@@ -14,7 +14,10 @@ use lucerna::{
     Result,
     gpu::{Gpu, GpuOptions},
     graph::{Graph, Report, Runner},
-    passes::ambient::Irradiance,
+    passes::{
+        ambient::Irradiance,
+        shadow::{self, Kind},
+    },
     resident::Resident,
     scene::{Camera, Light, LightKind, Material, Mesh, Node, Pose, Primitive, Projection, Scene, Transform, View},
     techniques::isr::{PictureSettings, Resolution, Settings, picture},
@@ -73,8 +76,46 @@ fn run() -> Result<bool> {
             );
         }
     }
+    shadows(&mut runner, (&scenes, &mut residents), extent, rounds)?;
     println!("largest ratio between the scenes: {worst:.3} (the aim is at most 1.10)");
     Ok(worst <= 1.10)
+}
+
+/// Prints the cost of shadows of the paper's kinds, and of the filter over the picture (dissertation, section 4.6): all passes of a frame without
+/// gathered light.
+fn shadows(
+    runner: &mut Runner,
+    (scenes, residents): (&[Scene; 2], &mut [Resident]),
+    extent: [u32; 2],
+    rounds: usize,
+) -> Result<()> {
+    println!("{:<32} {:>20} {:>20}", "shadows, direct light alone", scenes[0].name, scenes[1].name);
+    for (name, kind, screen_blur) in [
+        ("off", Kind::Off, 0),
+        ("plain", Kind::Plain, 0),
+        ("percentage closer", Kind::Pcf, 0),
+        ("exponential", Kind::Exponential, 0),
+        ("exponential, filter of 4 pixels", Kind::Exponential, 4),
+        ("exponential, filter of 12 pixels", Kind::Exponential, 12),
+    ] {
+        let settings = PictureSettings {
+            isr: Settings { indirect: false, occlusion: false, ..Settings::paper() },
+            shadow: shadow::Settings { kind, screen_blur, ..shadow::Settings::dissertation() },
+            ..PictureSettings::paper()
+        };
+        let mut all = [vec![], vec![]];
+        for round in 0..=rounds {
+            for which in 0..2 {
+                let report = once(runner, &scenes[which], &mut residents[which], extent, &settings)?;
+                if round > 0 {
+                    all[which].push(cost(&report, |_| true));
+                }
+            }
+        }
+        let [simple, complex] = all.map(median);
+        println!("{name:<32} {simple:>20.3} {complex:>20.3}");
+    }
+    Ok(())
 }
 
 /// Passes whose cost must depend on the image only.

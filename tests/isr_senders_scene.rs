@@ -2,12 +2,12 @@
 
 use crate::isr_lab;
 use crate::scene_kit;
-use glam::{DVec3, Vec2, Vec4, dvec3};
+use glam::{DVec3, Vec2, Vec3, Vec4, dvec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     passes::ambient::Irradiance,
     reference::isr_scene::{Buffers, Eye, Patch},
-    scene::{Material, Primitive, Scene},
+    scene::{Light, LightKind, Material, Node, Primitive, Scene, Transform},
     techniques::isr::{PictureSettings, Settings, picture},
 };
 
@@ -84,6 +84,57 @@ fn a_wall_behind_something_lights_the_floor_as_the_closed_form_says() {
             println!("{layers} layers: {:.3} of the closed form", found / exact);
             assert!((found / exact - share).abs() < 0.1 * share + 1e-6, "{layers} layers: {found} of {exact}");
         }
+    });
+}
+
+#[test]
+fn masks_of_materials_scale_received_and_sent_light() {
+    with_gpu(|gpu| {
+        let wall = patch([-1.0, 0.0, -2.0], [2.0, 0.0, 0.0], [0.0, 1.0, 0.0], 0.5, 1.0);
+        let patches = [floor(1.0), wall];
+        let eye = Eye::look_at(dvec3(0.0, 1.5, 2.0), dvec3(0.0, 0.3, -1.3), 0.9, 10.0, 120, 96);
+        let mut scene = scene_of(&patches);
+        let count = scene.materials.len();
+        for (material, name) in scene.materials[count - 2..].iter_mut().zip(["floor", "wall"]) {
+            material.name = name.into();
+        }
+        let lamp = scene.lights.len() as u32;
+        let kind = LightKind::Directional;
+        scene.lights.push(Light { name: String::new(), kind, color: Vec3::ONE, intensity: 0.01 });
+        let down = Transform::Matrix(glam::Mat4::from_rotation_x(-1.2));
+        scene.nodes.push(Node { light: Some(lamp), local: down, ..Node::default() });
+        let light = |mask: &str, base: Settings| {
+            let settings = PictureSettings { isr: Settings { mask: mask.into(), ..base }, ..Default::default() };
+            let (frame, token) = scene_kit::frame(gpu, &scene, |graph, handles| {
+                let view = isr_lab::view(&eye);
+                let out = picture(graph, handles, &view, Irradiance::default(), &settings).unwrap().outputs;
+                [out.indirect, out.direct].map(|image| graph.read_image(image))
+            });
+            let [found, direct] = token.map(|token| -> Vec<f64> {
+                frame.image(token).to_f32().iter().map(|texel| f64::from(texel[0])).collect()
+            });
+            (on_the_floor(&found, &eye, &patches, |_| 0.0).0, direct)
+        };
+        for base in [Settings::default(), Settings { cameras: 1, ..Settings::default() }, Settings::paper()] {
+            let (whole, direct) = light("", base.clone());
+            assert!(whole > 0.0 && direct.iter().any(|light| *light > 0.0));
+            for (mask, share) in
+                [("floor=0.4", 0.4), ("wall=0.4", 0.4), ("floor=0.4,wall=0.2", 0.08), ("wall=0", 0.0), ("wall=1", 1.0)]
+            {
+                let (found, same) = light(mask, base.clone());
+                let found = found / whole;
+                println!("{mask}: {found:.3} of the light without masks");
+                assert!(same == direct, "{mask}: direct light differs");
+                // The sun on the floor alone makes some thousandths.
+                assert!((found - share).abs() < 0.02 * share + 3e-3, "{mask}: {found}, expected {share}");
+            }
+        }
+        let settings =
+            PictureSettings { isr: Settings { mask: "roof=1".into(), ..Settings::default() }, ..Default::default() };
+        scene_kit::frame(gpu, &scene, |graph, handles| {
+            let made = picture(graph, handles, &isr_lab::view(&eye), Irradiance::default(), &settings);
+            assert!(made.unwrap_err().to_string().contains("has no material 'roof'"));
+        });
     });
 }
 

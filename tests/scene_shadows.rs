@@ -6,7 +6,11 @@ use glam::{Mat4, Quat, Vec3};
 use lucerna::{
     gpu::{ImageDesc, OwnedImage, Region, testing::with_gpu},
     graph::{Extent, Format, Graph, Runner},
-    passes::shadow::{self, Kind, Settings},
+    passes::{
+        direct::{self, Direct, Lights},
+        gbuffer,
+        shadow::{self, Kind, Settings},
+    },
     resident::Resident,
     scene::{AlphaMode, LightKind, Material, MipFilter, Sampler, Scene, Texture, TextureRef, View, Wrap},
     shaders::{passes::shadow_blur, test::exponential, test::shadow as shadow_probe, types},
@@ -132,6 +136,70 @@ fn holes_in_masked_casters_let_light_through() {
         }
         assert!(seen[0] > 20 && seen[1] > 20);
     });
+}
+
+#[test]
+fn a_filter_over_the_picture_smooths_shadows_and_stops_at_silhouettes() {
+    let mut scene = square_over_plane(Material::diffuse("", Vec3::ONE));
+    let lamps = [(LightKind::Point { range: None }, LIGHT_AT), (LightKind::Directional, Vec3::new(-0.6, 3.0, 0.8))];
+    with_gpu(|gpu| {
+        for (kind, at) in lamps {
+            light(&mut scene, kind, look(at, Vec3::ZERO));
+        }
+        // The same lights again and again: those from the seventeenth on are not filtered.
+        let few = scene.nodes.len();
+        let picture = |scene: &Scene, settings: &Settings| {
+            let (frame, (lit, depth)) = frame(gpu, scene, |graph, handles| {
+                let surfaces = gbuffer::draw(graph, handles, &camera(), &gbuffer::Settings::default());
+                let maps = shadow::draw(graph, handles, &camera(), settings);
+                assert_eq!(maps.notes.len(), usize::from(settings.screen_blur > 0 && scene.nodes.len() > few));
+                let choices = Direct { specular: false, ..Direct::default() };
+                let lit = direct::light(graph, &surfaces, Lights::from(&maps), &choices).direct;
+                (graph.read_image(lit), graph.read_image(surfaces.depth))
+            });
+            let values = |token| -> Vec<f32> { frame.image(token).to_f32().iter().map(|texel| texel[0]).collect() };
+            (values(lit), values(depth))
+        };
+        for kind in [Kind::Plain, Kind::Pcf] {
+            let hard = Settings { kind, size: 512, cascades: 1, ..Settings::default() };
+            let soft = Settings { screen_blur: 4, ..hard };
+            let ((before, depth), (after, _)) = (picture(&scene, &hard), picture(&scene, &soft));
+            let sum = |light: &[f32]| light.iter().sum::<f32>();
+            assert!((sum(&after) / sum(&before) - 1.0).abs() < 0.01, "{}", sum(&after) / sum(&before));
+            let changed = before.iter().zip(&after).filter(|(a, b)| (*a - *b).abs() > 0.02 * **a).count();
+            // The edges of two shadows, eight pixels wide.
+            assert!((40..900).contains(&changed), "{kind:?}: {changed} pixels change");
+            // The square is lit all over, and no shadow comes onto it from the ground behind its edges.
+            let roof = (0..depth.len()).filter(|i| {
+                let seen = scene_position(&camera(), *i, depth[*i]);
+                (seen.y - 1.0).abs() < 0.01
+            });
+            let roof: Vec<usize> = roof.collect();
+            assert!(roof.len() > 8, "{} pixels of the square", roof.len());
+            for i in roof {
+                assert!((after[i] / before[i] - 1.0).abs() < 2e-3, "{kind:?}, pixel {i}: {} {}", before[i], after[i]);
+            }
+        }
+        // Without shadows there is nothing to filter.
+        let off = Settings { kind: Kind::Off, ..Settings::default() };
+        assert!(picture(&scene, &off) == picture(&scene, &Settings { screen_blur: 9, ..off }));
+        for _ in 0..15 {
+            light(&mut scene, LightKind::Point { range: None }, look(LIGHT_AT, Vec3::ZERO));
+        }
+        let many = Settings { kind: Kind::Plain, size: 64, cascades: 1, screen_blur: 4, ..Settings::default() };
+        let few_maps = picture(&scene, &many).0;
+        assert!(few_maps.iter().all(|light| light.is_finite()));
+    });
+}
+
+/// Place of a pixel of linear depth `z`, world space.
+fn scene_position(view: &View, pixel: usize, z: f32) -> Vec3 {
+    let [width, height] = view.extent;
+    let at = [(pixel as u32 % width, width), (pixel as u32 / width, height)]
+        .map(|(p, n)| (p as f32 + 0.5) / n as f32 * 2.0 - 1.0);
+    let through = view.clip_from_world.inverse().project_point3(Vec3::new(at[0], -at[1], 0.5)) - view.position;
+    let [_, _, forward] = view.axes();
+    view.position + through * (z * view.far / through.dot(forward))
 }
 
 #[test]

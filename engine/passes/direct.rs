@@ -1,9 +1,12 @@
 //! Direct light of all punctual lights.
 
-use super::{gbuffer::GBuffer, shadow::ShadowMaps};
+use super::{bilateral, downsample, gbuffer::GBuffer, shadow::ShadowMaps};
 use crate::{
     graph::{Buffer, Format, Graph, Image},
-    shaders::passes::direct,
+    shaders::{
+        consts::SHADOW_SCREENED,
+        passes::{direct, shadow_screen},
+    },
 };
 
 /// The lights of the scene and their shadow maps.
@@ -15,11 +18,14 @@ pub struct Lights {
     pub shadows: Buffer,
     /// All shadow maps, an array image.
     pub shadow_maps: Image,
+    /// Number of lights, and the reach of the filter of their shadows over the picture, pixels; 0: none.
+    pub screen_blur: (u32, u32),
 }
 
 impl From<&ShadowMaps> for Lights {
     fn from(maps: &ShadowMaps) -> Self {
-        Self { lights: maps.lights, shadows: maps.shadows, shadow_maps: maps.maps }
+        let ShadowMaps { lights, shadows, maps: shadow_maps, screen_blur, .. } = *maps;
+        Self { lights, shadows, shadow_maps, screen_blur }
     }
 }
 
@@ -73,6 +79,7 @@ pub fn light(graph: &mut Graph, g: &GBuffer, lights: Lights, choices: &Direct) -
         direct: graph.image("direct", Format::RGBA16F, extent),
         diffuse: graph.image("direct.diffuse", Format::RGBA16F, extent),
     };
+    let (screened, filtered) = screened(graph, g, lights);
     let args = direct::Args {
         view: g.view,
         albedo: g.albedo,
@@ -85,6 +92,7 @@ pub fn light(graph: &mut Graph, g: &GBuffer, lights: Lights, choices: &Direct) -
         lights: lights.lights,
         shadows: lights.shadows,
         shadow_maps: lights.shadow_maps,
+        screened: filtered,
         push: direct::Push {
             light_radius: choices.light_radius,
             light_power: choices.light_power,
@@ -92,8 +100,41 @@ pub fn light(graph: &mut Graph, g: &GBuffer, lights: Lights, choices: &Direct) -
             strength: choices.strength,
             glow: choices.glow.into(),
         },
-        spec: direct::Spec { paper_law: choices.paper_law.into(), specular: choices.specular.into() },
+        spec: direct::Spec { paper_law: choices.paper_law.into(), specular: choices.specular.into(), screened },
     };
     graph.compute(args, extent);
     lit
+}
+
+/// Distance from a pixel's plane, relative to its depth, at which the weight of another pixel's shadow falls to exp(−1/2).
+const SHADOW_RANGE: f32 = 0.01;
+
+/// Filtered shadows of the first lights ([`super::shadow::Settings::screen_blur`]): their number, and images with a channel for each.
+fn screened(graph: &mut Graph, g: &GBuffer, lights: Lights) -> (u32, [Image; 4]) {
+    let (count, reach) = lights.screen_blur;
+    let count = if reach == 0 { 0 } else { count.min(SHADOW_SCREENED) };
+    let mut images = [g.depth; 4];
+    if count == 0 {
+        return (0, images);
+    }
+    graph.scope("shadow.screen", |graph| {
+        let decoded = downsample::gbuffer(graph, g, 1, false);
+        for (image, first) in images.iter_mut().zip((0..count).step_by(4)) {
+            let extent = graph.extent(g.depth);
+            let shadow = graph.image("shadow.screen", Format::RGBA16F, extent);
+            let args = shadow_screen::Args {
+                view: g.view,
+                normal: g.normal,
+                depth: g.depth,
+                shadow,
+                lights: lights.lights,
+                shadows: lights.shadows,
+                shadow_maps: lights.shadow_maps,
+                push: shadow_screen::Push { first },
+            };
+            graph.compute(args, extent);
+            *image = bilateral::blur(graph, shadow, &decoded, g.view, 1, reach, SHADOW_RANGE);
+        }
+    });
+    (count, images)
 }

@@ -67,7 +67,7 @@ impl Default for Settings {
 /// Full-resolution images; encodings in `lib/gbuffer.glsl`.
 #[derive(Clone, Copy, Debug)]
 pub struct GBuffer {
-    /// sRGB8: (1 − metallic) · base colour (linear when sampled); alpha: radiation mask, 1 ordinary, 0 unlit.
+    /// sRGB8: (1 − metallic) · base colour (linear when sampled); alpha: radiation mask, 1 ordinary, 0 unlit, or what `isr.mask` gives to a material.
     pub albedo: Image,
     /// World normal; read it with `decode_normal`.
     pub normal: Image,

@@ -71,6 +71,10 @@ pub struct Settings {
     /// Offset of the receiver along its normal at grazing angles.
     #[schemars(range(min = 0, max = 1000), extend("x-unit" = "texels", "x-needs" = {"kind": {"not": {"const": "off"}}}))]
     pub normal_bias: f32,
+    /// Reach of a filter over the picture that smooths the shadows of the first 16 lights, to each side. It stops at steps of the depth and at
+    /// creases. 0: no filter. The dissertation proposes such a filter (section 4.6); a filter that does not stop would carry shadows across silhouettes.
+    #[schemars(range(min = 0, max = 32), extend("x-unit" = "pixels", "x-needs" = {"kind": {"not": {"const": "off"}}}))]
+    pub screen_blur: u32,
 }
 
 described!(Settings);
@@ -89,6 +93,7 @@ impl Default for Settings {
             blur: 1.5,
             depth_bias: 1.0,
             normal_bias: 1.5,
+            screen_blur: 0,
         }
     }
 }
@@ -115,6 +120,8 @@ pub struct ShadowMaps {
     pub shadows: Buffer,
     /// Sampler `shadow_maps`: an array, one layer a slot.
     pub maps: Image,
+    /// Number of lights, and the reach of the filter over the picture, pixels ([`Settings::screen_blur`]).
+    pub screen_blur: (u32, u32),
     /// Lights without shadows because all [`consts::MAX_SHADOW_SLOTS`] maps are taken, and why.
     pub notes: Vec<Note>,
 }
@@ -138,13 +145,26 @@ pub fn draw_of(
         _ => assign(&scene.moment.lights, &scene.bounds(), view, &settings, casts),
     };
     let shadows = graph.buffer_from("shadow.slots", &block(&assignment, &settings));
+    let screen_blur = if settings.kind == Kind::Off { 0 } else { settings.screen_blur };
     let notes = assignment.unshadowed.iter().map(|light| Note {
         kind: NoteKind::Ignored,
         place: format!("lights[{light}]"),
         text: format!("casts no shadow: all {} shadow maps are taken", consts::MAX_SHADOW_SLOTS),
     });
+    let few = (screen_blur > 0 && scene.moment.lights.len() > consts::SHADOW_SCREENED as usize).then(|| Note {
+        kind: NoteKind::Approximated,
+        place: "shadow.screen_blur".into(),
+        text: format!("only the shadows of the first {} lights are filtered", consts::SHADOW_SCREENED),
+    });
+    let notes = notes.chain(few).collect();
     let maps = graph.scope("shadow", |graph| maps(graph, scene, &assignment, shadows, &settings));
-    ShadowMaps { lights: scene.lights, shadows, maps, notes: notes.collect() }
+    ShadowMaps {
+        lights: scene.lights,
+        shadows,
+        maps,
+        screen_blur: (scene.moment.lights.len() as u32, screen_blur),
+        notes,
+    }
 }
 
 /// Settings without values that [`draw`], which has no errors, cannot use. Callers that need an error call [`Settings::validate`].
@@ -161,6 +181,7 @@ fn sane(settings: &Settings) -> Settings {
         blur: positive(settings.blur, 0.0).min(16.0),
         depth_bias: positive(settings.depth_bias, 0.0),
         normal_bias: positive(settings.normal_bias, 0.0),
+        screen_blur: settings.screen_blur.min(32),
         ..*settings
     }
 }

@@ -46,6 +46,7 @@ pub struct Resident {
     materials: OwnedBuffer,
     /// The same on the host.
     material_table: Arc<[types::Material]>,
+    material_names: Arc<[String]>,
     skin_vertices: OwnedBuffer,
     morph_deltas: OwnedBuffer,
     stream_deltas: OwnedBuffer,
@@ -149,6 +150,8 @@ pub struct Handles {
     pub materials: Buffer,
     /// The contents of `materials`, for techniques that change them for a frame.
     pub material_table: Arc<[types::Material]>,
+    /// Names of the materials, in the same order.
+    pub material_names: Arc<[String]>,
     /// `lib/lights.glsl`: count and lights.
     pub lights: Buffer,
     /// `scene_textures` of `lib/material.glsl`.
@@ -226,6 +229,7 @@ impl Resident {
             indices: buffer("scene.indices", &raw(&streams.indices))?,
             materials: buffer("scene.materials", &raw(&materials))?,
             material_table: materials.into(),
+            material_names: scene.materials.iter().map(|material| material.name.clone()).collect(),
             skin_vertices: buffer("scene.skin_vertices", &raw(&deform.skin_vertices))?,
             morph_deltas: buffer("scene.morph_deltas", &raw(&deform.morph_deltas))?,
             stream_deltas: buffer("scene.stream_deltas", &raw(&deform.stream_deltas))?,
@@ -307,6 +311,7 @@ impl Resident {
             instances: graph.buffer_from("scene.instances", &at_least_one(&instances)),
             materials: graph.import_buffer(&self.materials),
             material_table: self.material_table.clone(),
+            material_names: self.material_names.clone(),
             lights: graph.buffer_from("scene.lights", &lights),
             textures,
             environment: graph.import_image(&self.environment).repeat(),

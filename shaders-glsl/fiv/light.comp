@@ -27,6 +27,8 @@ struct FivWhole {
     uint occluders;
     uint spots;
     float negligible; // share of the mean irradiance
+    vec2 turn;        // cosine and sine of the rotation of the environment since its irradiance map, about +y
+    float factor;     // on its radiance since then
 };
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
@@ -101,6 +103,12 @@ vec3 amount_of(uint i, vec3 p, vec3 n, FivAlong along) {
     return held_amounts[i];
 }
 
+// Irradiance of the whole environment, W/m².
+vec3 open_irradiance(vec3 n) {
+    vec3 then = vec3(whole.turn.x * n.x - whole.turn.y * n.z, n.y, whole.turn.y * n.x + whole.turn.x * n.z);
+    return whole.factor * textureLod(difmap, cube_lookup(then), 0.0).rgb;
+}
+
 // Nodes of the mean over the unit interval: Gauss-Legendre, exact for seven overlapping occluders.
 const vec4 NODES = vec4(0.0694318442, 0.3300094782, 0.6699905218, 0.9305681558);
 const vec4 WEIGHTS = vec4(0.1739274226, 0.3260725774, 0.3260725774, 0.1739274226);
@@ -147,8 +155,8 @@ void main() {
     vec2 shown = texelFetch(identity, pixel, 0).rg;
     uint self = FIV_NONE;
     if (shown.x > 0.5 && abs(shown.y - z) <= 1e-4 * z) self = uint(shown.x + 0.5) - 1u;
-    vec3 open = textureLod(difmap, cube_lookup(n), 0.0).rgb;
-    vec3 behind = PARTIAL == 2u ? textureLod(difmap, cube_lookup(-n), 0.0).rgb : vec3(0.0);
+    vec3 open = open_irradiance(n);
+    vec3 behind = PARTIAL == 2u ? open_irradiance(-n) : vec3(0.0);
     vec3 lit = open;
     // Light that other occluders hide may already be hidden by the own occluder. The two are taken as independent.
     vec3 seen = vec3(1.0);

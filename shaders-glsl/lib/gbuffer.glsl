@@ -1,5 +1,6 @@
 // Encodings of the G-buffer (passes::gbuffer). Attachments:
-//   albedo   sRGB8 + A8   rgb: (1 - metallic) base colour, sampled linear; a: radiation mask (1 ordinary, 0 unlit)
+//   albedo   sRGB8 + A8   rgb: (1 - metallic) base colour, sampled linear; a: radiation mask (1 ordinary, 0 unlit,
+//                       between them for materials with a mask of image-space radiosity)
 //   normal   RGBA8 world normal c * 2 - 1 (a = 0), or RG16 octahedral (a reads as 1)
 //   depth    R32F eye distance / far; background exactly 1
 //   specular RGBA8 rgb: reflectance at normal incidence F0; a: roughness
@@ -8,6 +9,11 @@
 #define LIB_GBUFFER
 
 const float BACKGROUND_DEPTH = 1.0; // export
+
+// Whether a surface is unlit: it has neither colour nor reflectance. A radiation mask of 0 alone does not say so.
+bool gbuffer_unlit(vec4 albedo, vec4 specular) {
+    return albedo == vec4(0.0) && specular.rgb == vec3(0.0);
+}
 
 vec2 octahedral_encode(vec3 n) {
     vec2 p = n.xy / (abs(n.x) + abs(n.y) + abs(n.z));

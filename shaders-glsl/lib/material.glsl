@@ -19,7 +19,9 @@ const uint MATERIAL_DOUBLE_SIDED = 2u; // export
 const uint MATERIAL_MASK = 4u; // export
 const uint MATERIAL_BLEND = 8u; // export
 const uint MATERIAL_FIRST_TEXTURE = 8u; // export
-// Bits from there on: which slots of Material.textures are used.
+const uint MATERIAL_RADIATION_SHIFT = 24u; // export
+// Bits from the first texture on: which slots of Material.textures are used. Bits from the shift of radiation on: 255 minus the radiation mask
+// in 255ths, so 0 is the ordinary mask of 1.
 
 // Bits of TextureUse.mode.
 const uint SAMPLER_CLAMP_U = 1u; // export

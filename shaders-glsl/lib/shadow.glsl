@@ -16,6 +16,8 @@ const uint SHADOW_OFF = 0u; // export
 const uint SHADOW_PLAIN = 1u; // export
 const uint SHADOW_PCF = 2u; // export
 const uint SHADOW_EXPONENTIAL = 3u; // export
+// Lights whose shadows a filter over the picture smooths, at most.
+const uint SHADOW_SCREENED = 16u; // export
 
 // One layer: the view of a spot light, of a face of a point light, or of a cascade of a directional light.
 // Faces and spot views are a little wider than needed, so that filters find neighbours at the border.

@@ -135,11 +135,11 @@ void main() {
     vec4 gloss = texelFetch(specular, pixel, 0);
     vec3 mirrored = normalize(mix(reflect(-to_camera(view, p), n), n, gloss.a * gloss.a));
     around += max(gloss.rgb - 0.04, 0.0) * ambient_irradiance(mirrored);
-    around *= color.a * own.a / 3.14159265358979;
+    around *= own.a / 3.14159265358979;
     vec3 direct_part = OCCLUDE_AMBIENT != 0 ? light.rgb : (light.rgb - glow) * lit + glow;
     vec4 share = light_around.sky;
     around *= AREA != 0 ? share.rgb / max(share.a, 1e-6) : vec3(lit);
-    bounced += AREA != 0 ? color.a * color.rgb * light_around.lamps : vec3(0.0);
+    bounced += AREA != 0 ? color.rgb * light_around.lamps : vec3(0.0);
     vec3 sum = direct_part + around + bounced; // [ISR 29]
     imageStore(total, pixel, vec4(sum, 1.0));
     imageStore(indirect, pixel, vec4(around + bounced, 1.0));

@@ -17,6 +17,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 // brightest light, [ISR 16] over distance, cosine; no π; microfacets are added to it.
 layout(constant_id = 0) const uint PAPER_LAW = 0;
 layout(constant_id = 1) const uint SPECULAR = 1; // 0: Lambert's law alone
+layout(constant_id = 2) const uint SCREENED = 0; // lights whose shadows are in `screened`
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D albedo;
@@ -26,6 +27,8 @@ layout(binding = 4) uniform sampler2D specular;
 layout(binding = 5) uniform sampler2D emission;
 layout(binding = 6, rgba16f) uniform writeonly image2D direct;   // all that leaves towards the camera, with emission
 layout(binding = 7, rgba16f) uniform writeonly image2D diffuse;  // what leaves in all directions: by Lambert's law, and emission if `glow` is 1
+
+layout(binding = 11) uniform sampler2D screened[4]; // filtered shadows, a channel for each light
 
 layout(push_constant, scalar) uniform Push {
     float light_radius;  // l_r of lights without a range, metres; 0: the camera's far distance
@@ -39,6 +42,19 @@ layout(push_constant, scalar) uniform Push {
 float paper_attenuation(float distance, float radius) {
     float q = distance / radius;
     return clamp(1.0 - q * q, 0.0, 1.0);
+}
+
+// Filtered shadow of a light.
+float screened_shadow(uint light, ivec2 pixel) {
+    vec4 four;
+    switch (light / 4u) {
+        case 0u: four = texelFetch(screened[0], pixel, 0); break;
+        case 1u: four = texelFetch(screened[1], pixel, 0); break;
+        case 2u: four = texelFetch(screened[2], pixel, 0); break;
+        default: four = texelFetch(screened[3], pixel, 0); break;
+    }
+    uint channel = light % 4u;
+    return channel == 0u ? four.x : channel == 1u ? four.y : channel == 2u ? four.z : four.w;
 }
 
 void main() {
@@ -86,13 +102,14 @@ void main() {
         if (cosine <= 0.0 || e == vec3(0.0)) {
             continue;
         }
-        e *= strength * shadow_factor(one, p, n);
+        e *= strength * (i < SCREENED ? screened_shadow(i, pixel) : shadow_factor(one, p, n));
         matt += e * cosine;
         if (SPECULAR != 0) {
             shine += e * (layered ? brdf_cosine(brdf, n, v, to_light) : brdf_specular_cosine(brdf, n, v, to_light));
         }
     }
-    vec3 reflected = color.a * color.rgb * matt * (PAPER_LAW != 0 ? 1.0 : 1.0 / BRDF_PI);
+    if (gbuffer_unlit(color, gloss)) shine = vec3(0.0);
+    vec3 reflected = color.rgb * matt * (PAPER_LAW != 0 ? 1.0 : 1.0 / BRDF_PI);
     imageStore(diffuse, pixel, vec4(reflected + (glow != 0u ? emitted : vec3(0.0)), 1.0));
-    imageStore(direct, pixel, vec4((layered ? vec3(0.0) : reflected) + color.a * shine + emitted, 1.0));
+    imageStore(direct, pixel, vec4((layered ? vec3(0.0) : reflected) + shine + emitted, 1.0));
 }

@@ -95,7 +95,8 @@ void main() {
     float access = 1.0 + materials[m].occlusion_strength * (texels[TEXTURE_OCCLUSION].r - 1.0);
     vec3 emissive = materials[m].emissive * texels[TEXTURE_EMISSIVE].rgb;
 
-    albedo_out = vec4((1.0 - metallic) * base.rgb, 1.0);
+    float radiation = float(255u - (flags >> MATERIAL_RADIATION_SHIFT)) / 255.0;
+    albedo_out = vec4((1.0 - metallic) * base.rgb, radiation);
     specular_out = vec4(mix(vec3(dielectric), base.rgb, metallic), roughness);
     if ((flags & MATERIAL_UNLIT) != 0u) {
         // Shown as it is: neither receives nor reflects.

@@ -129,6 +129,7 @@ pub fn lights(graph: &mut Graph, lights: &[types::Light]) -> Lights {
         lights: graph.buffer_from("lights", &words),
         shadows: graph.buffer_from("shadows", &shadows),
         shadow_maps: maps,
+        screen_blur: (0, 0),
     }
 }
 

@@ -39,6 +39,7 @@ pub mod file;
 pub mod fill;
 mod hash;
 pub mod light;
+mod lighting;
 mod limits;
 mod negligible;
 pub mod occluder;

@@ -213,6 +213,8 @@ impl Fiv {
             occluders: count,
             spots: if shared { self.light.spots.len() as u32 } else { 0 },
             negligible: settings.negligible,
+            turn: [self.light.map_turn.cos(), self.light.map_turn.sin()],
+            factor: self.light.map_factor,
         };
         let whole = graph.uniform(&whole);
         let mut spots: Vec<_> = self.light.spots.iter().map(Spot::packed).collect();

@@ -202,7 +202,8 @@ pub struct Settings {
     #[schemars(range(min = -36000, max = 36000), extend("x-unit" = "°"))]
     pub rotation: f32,
     /// Additional rotation of the environment per second of a sequence. If the value is not
-    /// 0, rotated environments are resampled from means of pixels, which is faster and has errors of some thousandths.
+    /// 0, rotated environments are resampled from means of pixels, and their irradiance without shadows is looked up in that of the environment before the
+    /// rotation, which is faster and has errors of some thousandths.
     #[schemars(range(min = -36000, max = 36000), extend("x-unit" = "°/s"))]
     pub turning: f32,
     /// Scale of the environment's radiance as a power of two.

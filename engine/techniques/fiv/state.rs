@@ -1,10 +1,14 @@
 //! State that outlives a frame: the occluders of a scene with their vectors, and the environment on the device.
 
+use std::sync::Arc;
+
 use super::{
     Light, Method, Occluder, Occluders, Plan, Settings, Sky, Specular, Stored,
     fill::fill,
     hash::Hash,
-    light, negligible,
+    light,
+    lighting::Lighting,
+    negligible,
     online::Online,
     plan::Kind,
     prepared::PreparedSettings,
@@ -14,7 +18,7 @@ use super::{
 };
 use crate::{
     Error, ErrorKind, Result,
-    gpu::{DeviceKind, Gpu, OwnedBuffer},
+    gpu::{DeviceKind, Gpu, OwnedBuffer, OwnedImage},
     graph::Runner,
     rays::Rays,
     resident::Resident,
@@ -36,6 +40,8 @@ pub struct Fiv {
     sky: Sky,
     /// Resampled environments for other rotations.
     rotating_sky: RotatingSky,
+    /// Irradiance of the environment without rotation and scale, for one that rotates.
+    unturned: Option<Arc<OwnedImage>>,
     runner: Runner,
     /// Whether the driver ends loops early.
     pub(super) limited: bool,
@@ -77,31 +83,6 @@ pub struct Fiv {
     matter: Option<(Lighting, OwnedBuffer)>,
 }
 
-/// Rotation and scale of the environment.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Lighting {
-    /// Rotation about +Y, radians, with the environment's own rotation.
-    turn: f32,
-    /// Scale of radiance, with the environment's own scale.
-    factor: f32,
-    /// The environment is resampled pixel by pixel, because its rotation stays the same from picture to picture.
-    still: bool,
-}
-
-impl Lighting {
-    fn of(environment: &Environment, settings: &Settings) -> Self {
-        let (turn, factor) = settings.light();
-        let turn = environment.rotation + turn;
-        // All methods must have the light that precomputed vectors were computed for.
-        let still = settings.method == Method::Vectors || settings.turning == 0.0 || turn == environment.rotation;
-        Self { turn, factor: environment.scale * factor, still }
-    }
-
-    fn sky(self, rotating_sky: &mut RotatingSky, environment: &Environment) -> Result<Sky> {
-        rotating_sky.sky(environment, (self.turn, self.factor), self.still)
-    }
-}
-
 impl Fiv {
     /// Prepares a scene for [`Fiv::picture`]. Vectors that `stored` contains are taken from there. The number and
     /// spacing of samples in `stored` replace the choices of `settings`. All other vectors are computed. `progress`
@@ -132,10 +113,10 @@ impl Fiv {
         let lighting = Lighting::of(environment, &settings);
         let environment_made_for = [LOOKED_AT, usize::MAX].map(|pixels| fingerprint(environment, pixels));
         let mut rotating_sky = RotatingSky::new(settings.size);
-        let sky = lighting.sky(&mut rotating_sky, environment)?.apart(settings.apart());
         let name = environment.name.as_str();
-        let mut runner = Runner::new(gpu);
-        let light = Light::with(&mut runner, &sky)?;
+        let (mut runner, mut unturned) = (Runner::new(gpu), None);
+        let apart = settings.apart();
+        let (sky, light) = lighting.light(&mut runner, environment, (&mut rotating_sky, &mut unturned), apart)?;
         let pose = Pose::rest(scene);
         let occluders = Occluders::of(scene, &pose, settings.flat, settings.largest);
         if occluders.placed.len() > MOST_OCCLUDERS {
@@ -204,6 +185,7 @@ impl Fiv {
             light,
             sky,
             rotating_sky,
+            unturned,
             runner,
             limited: gpu.loop_limit()?.is_some(),
             on_cpu: gpu.caps().kind == DeviceKind::Cpu,
@@ -268,12 +250,12 @@ impl Fiv {
         }
         if by != self.environment_now {
             self.rotating_sky.forget();
-            self.matter = None;
+            (self.matter, self.unturned) = (None, None);
         } else if wanted == self.lighting {
             return Ok(());
         }
-        self.sky = wanted.sky(&mut self.rotating_sky, environment)?.apart(settings.apart());
-        self.light = Light::with(&mut self.runner, &self.sky)?;
+        let kept = (&mut self.rotating_sky, &mut self.unturned);
+        (self.sky, self.light) = wanted.light(&mut self.runner, environment, kept, settings.apart())?;
         (self.lighting, self.environment_now) = (wanted, by);
         Ok(())
     }

@@ -24,6 +24,7 @@
 //! turned away ([`senders`]), full resolution, and numbers of samples that follow the depth ([`Settings::samples_by_depth`]).
 
 mod area;
+mod mask;
 mod picture;
 pub mod senders;
 mod settings;

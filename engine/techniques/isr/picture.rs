@@ -1,7 +1,7 @@
 //! Everything from a scene on the device to the final picture.
 
 use super::super::allowed::radiance;
-use super::{Inputs, Outputs, Settings, Surroundings, frame, senders};
+use super::{Inputs, Outputs, Settings, Surroundings, frame, mask::Masks, senders};
 use crate::{
     Result,
     graph::Graph,
@@ -59,7 +59,7 @@ pub struct Picture {
 /// [`super::Area::frame`].
 ///
 /// # Errors
-/// `Usage` if a setting is out of its range.
+/// `Usage` if a setting is out of its range, and if [`Settings::mask`] names a material that the scene has not.
 pub fn picture(
     graph: &mut Graph,
     scene: &Handles,
@@ -68,6 +68,8 @@ pub fn picture(
     settings: &PictureSettings,
 ) -> Result<Picture> {
     settings.validate()?;
+    let masked = Masks::by_names(&scene.material_names, &settings.isr.mask)?.applied(graph, scene);
+    let scene = &*masked;
     let surroundings = surroundings.into();
     let gbuffer = gbuffer::draw(graph, scene, view, &settings.gbuffer);
     let shadows = shadow::draw(graph, scene, view, &settings.shadow);

@@ -277,14 +277,14 @@ pub fn draw(
 fn lights(graph: &mut Graph, scene: &Handles, frame: Lights, shadows: &shadow::Settings) -> Lights {
     let suns = scene.moment.lights.iter().any(|light| light.kind == shaders::consts::LIGHT_DIRECTIONAL);
     if !suns || shadows.kind == shadow::Kind::Off {
-        return frame;
+        return Lights { screen_blur: (0, 0), ..frame };
     }
     let bounds = scene.bounds();
     let radius = bounds.half().length().clamp(1e-3, 1e6);
     let projection = Projection::Orthographic { xmag: radius, ymag: radius, znear: 0.0, zfar: 2.0 * radius };
     let from = Mat4::from_translation(bounds.centre() + Vec3::Z * radius);
     let all = View::new(&Camera { name: String::new(), projection }, from, [64, 64]);
-    let settings = shadow::Settings { cascades: 1, distance: 0.0, ..*shadows };
+    let settings = shadow::Settings { cascades: 1, distance: 0.0, screen_blur: 0, ..*shadows };
     Lights::from(&graph.scope("isr.senders", |graph| shadow::draw(graph, scene, &all, &settings)))
 }
 

@@ -242,6 +242,10 @@ pub struct Settings {
     /// What the receiver does with gathered light.
     #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub receiver: Receiver,
+    /// Radiation masks of materials, `NAME=SHARE` with commas between them, for instance `floor=0.5, curtain=0`: the share of the indirect light that
+    /// surfaces of a material receive and send, 0 to 1 [ISR 25]. Empty: 1 for all. Light by rays from the sky and from glowing surfaces arrives in full.
+    #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
+    pub mask: String,
     /// Power of indirect light. The area estimator needs no balancing: 1.
     #[schemars(range(min = 0, max = 1000), extend("x-needs" = {"indirect": {"const": true}}))]
     pub k_isr: f32,
@@ -310,6 +314,7 @@ impl Default for Settings {
             upsample: Upsample::Plane,
             upsample_epsilon: 1e-3,
             receiver: Receiver::Albedo,
+            mask: String::new(),
             k_isr: 1.0,
             k_ssao: 1.0,
             occlude: Occlude::Ambient,

@@ -5,6 +5,7 @@ mod daylight;
 mod fiv;
 mod igi;
 mod isr;
+mod observer;
 pub mod papers;
 mod prt;
 mod tonemap;

@@ -2,16 +2,18 @@
 //!
 //! The analysis finds techniques by their names: `gtm`, `ltm`, `stm` (global, local and selective tone mapping by the literal operator; `stm` with
 //! a matrix of `tonemap.mark`), `ltm-growing` and `stm-growing` (matrices of `tonemap.radius` and `tonemap.mark`), `ltm-fast`, `stm-fast`, `ltm-pyramid`, `stm-pyramid`,
-//! `stm-threshold` (a matrix of `tonemap.threshold`), `stm-saliency`, `stm-half`; and the reference `cpu`. Scenes of the group `still` are pictures, all others frames.
+//! `stm-threshold` (a matrix of `tonemap.threshold`), `unit-gtm`, `unit-ltm`, `unit-stm`, `unit-saliency` (matrices of `tonemap.exposure`), `stm-saliency`, `stm-half`; and the reference `cpu`. Scenes of the group `still` are pictures, all others frames.
 
 mod alike;
 mod tables;
+mod units;
 
 use lucerna::{
     Result,
-    measure::{Display, Exposure, Measure, Options, Pair, ToneCurve},
+    measure::{Measure, Options, Pair},
 };
 
+use super::observer;
 use crate::{
     experiment::{
         place::spread,
@@ -27,15 +29,14 @@ const STILL: &str = "still";
 /// Maximum of pixels of a frame whose losses are measured.
 const MEASURED: usize = 1 << 20;
 
-/// VDP options for an inexperienced observer, who does not know the differences to look for (slope of masking 1). Only differences that are
-/// detected almost certainly count (p > 0.95). The thesis names neither the program that computed its VDP nor its settings.
+/// The observer of the VDP in the tables, of pictures that are light of a screen.
 fn casual() -> Options {
-    Options { vdp_masking_slope: 1.0, vdp_threshold: 0.95, ..practised() }
+    observer::inexperienced(0.0)
 }
 
-/// VDP options for Daly's practised observer, with differences that are detected in three of four cases.
+/// Daly's practised observer.
 fn practised() -> Options {
-    Options { display: Display { exposure: Exposure::Stops(0.0), curve: ToneCurve::Clip }, ..Options::default() }
+    observer::practised(0.0)
 }
 
 /// Longest side of an image in the page, pixels.
@@ -53,6 +54,9 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
         page.add(tables::stills(&views)?);
     }
     page.add(tables::quality(&views)?);
+    if let Some(section) = units::section(&views)? {
+        page.add(section);
+    }
     page.add(tables::operators(&views)?);
     page.add(images(results, &views)?);
     Ok(())

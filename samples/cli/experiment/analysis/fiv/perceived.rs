@@ -3,11 +3,12 @@
 use lucerna::{
     Result,
     image::srgb,
-    measure::{Display, Exposure, Measure, Measured, Options, Pair, Picture, ToneCurve},
+    measure::{Measure, Measured, Options, Pair, Picture},
     reference::tonemap,
     techniques::tonemap::Settings,
 };
 
+use super::super::observer;
 use super::{GROUND, Lab, SETS, TRUTH, paper};
 use crate::{
     experiment::results::{Done, Layer},
@@ -29,7 +30,7 @@ const CODES: f64 = 5.0 / 255.0;
 pub(super) fn tables(lab: &Lab<'_>) -> Result<Section> {
     let mut section = Section::new("Tables 17 and 18: before and after tone mapping");
     section.text(
-        "Share of pixels with a visible difference from brute force (VDP for an inexperienced observer, p > 0.75). The first two tables have the thesis' views: in perspective, with the \
+        "Share of pixels with a visible difference from brute force (VDP for an inexperienced observer, p > 0.95, as in the tables of tone mapping). The first two tables have the thesis' views: in perspective, with the \
          environment behind, without the objects that cast the shadows, so that they hide no error (section 5.4). Before tone mapping, pixels of the background cannot differ; they count. *Before* is before \
          tone mapping, at an exposure at which the lit ground spans the screen's range. *After* is after \
          Ashikhmin's local operator. The thesis names neither the program that computed its VDP nor its settings. *Background* is the share of pixels that show the environment. \
@@ -64,17 +65,22 @@ pub(super) fn tables(lab: &Lab<'_>) -> Result<Section> {
     }
     section.text(
         "The same pairs before tone mapping, with other settings of the VDP. *8 bits*: both pictures are rounded to the codes of an sRGB \
-         file first, as a program that reads such files sees them. *p > 0.95*: a difference must be detected with this probability. *Half the \
-         pixels per degree*: the screen is half as far away. *Practised*: the observer of Daly, whose masking has a slope of 0.7.",
+         file first, as a program that reads such files sees them. *p > 0.75*: a difference must be detected with this probability. *Half the \
+         pixels per degree*: the screen is half as far away. *Practised*: the observer of Daly, whose masking has a slope of 0.7, with p > 0.75.",
     );
     section.add(observers(lab)?);
+    section.text(
+        "The operator works in cd/m², and the thesis prints no unit for its pictures of scenes. The last table has the shares after tone mapping for other luminances of the log-average. Section 5.4 says that \
+         tone mapping lowers the share of visible differences; the column *least* has the lowest share of the row.",
+    );
+    section.add(units(lab)?);
     images.into_iter().for_each(|set| section.add(set));
     Ok(section)
 }
 
 /// Shares of visible differences before tone mapping by the settings of the VDP.
 fn observers(lab: &Lab<'_>) -> Result<Table> {
-    let columns = ["environment", "samples", "size", "thesis", "as above", "8 bits", "p > 0.95", "8 bits, p > 0.95"];
+    let columns = ["environment", "samples", "size", "thesis", "as above", "8 bits", "p > 0.75", "8 bits, p > 0.75"];
     let more = ["half the pixels per degree", "practised"];
     let caption = lab.caption_without_size("VDP (%) before tone mapping by its settings");
     let mut table = Table::new("vdp-settings", caption, columns.into_iter().chain(more));
@@ -85,19 +91,48 @@ fn observers(lab: &Lab<'_>) -> Result<Table> {
         let Some(found) = SEEN.found(lab, scene, samples)? else { continue };
         let [float, codes] = [false, true].map(|codes| found.before(codes));
         let (float, codes) = (float?, codes?);
-        let sure = Options { vdp_threshold: 0.95, ..options(0.0) };
-        let near = Options { pixels_per_degree: 0.5 * options(0.0).pixels_per_degree, ..options(0.0) };
-        let practised = Options { vdp_masking_slope: Options::default().vdp_masking_slope, ..options(0.0) };
+        let own = observer::inexperienced(0.0);
+        let practised = observer::practised(0.0);
+        let likely = Options { vdp_threshold: practised.vdp_threshold, ..own.clone() };
+        let near = Options { pixels_per_degree: 0.5 * own.pixels_per_degree, ..own.clone() };
         let shares = [
             found.vdp[0].value,
-            share(&codes, &options(0.0))?,
-            share(&float, &sure)?,
-            share(&codes, &sure)?,
+            share(&codes, &own)?,
+            share(&float, &likely)?,
+            share(&codes, &likely)?,
             share(&float, &near)?,
             share(&float, &practised)?,
         ];
         let cells = [name.into(), samples.into(), found.size(), thesis.into()];
         table.push(cells.into_iter().chain(shares.map(Cell::from)));
+    }
+    Ok(table)
+}
+
+/// Luminances to which the log-average is scaled before tone mapping, cd/m².
+const GREYS: [f32; 5] = [0.3, 2.0, GREY, 100.0, 600.0];
+
+/// Shares of visible differences after tone mapping by the unit of the pictures.
+fn units(lab: &Lab<'_>) -> Result<Table> {
+    let columns = ["environment", "samples", "size", "before (thesis)", "after (thesis)", "before"].map(str::to_owned);
+    let greys = GREYS.map(|grey| format!("after, {grey} cd/m²"));
+    let caption = lab.caption_without_size("VDP (%) after tone mapping by the luminance of the log-average");
+    let columns = columns.into_iter().chain(greys).chain(["least".to_owned()]);
+    let mut table = Table::new("vdp-units", caption, columns);
+    let sets =
+        paper::TABLE_17.map(|(samples, before, after)| ("one area light", "bunny, area", Some(samples), before, after));
+    let environments = paper::TABLE_18.map(|(name, scene, before, after)| (name, scene, None, before, after));
+    for (name, scene, samples, before, after) in sets.into_iter().chain(environments) {
+        let samples = samples.unwrap_or_else(|| SEEN.nearest(lab, scene));
+        let Some(found) = SEEN.found(lab, scene, samples)? else { continue };
+        let mut shares = Vec::new();
+        for grey in GREYS {
+            let pair = [mapped(&found.truth[0], grey)?, mapped(&found.test[0], grey)?];
+            shares.push(share(&pair, &observer::inexperienced(0.0))?);
+        }
+        let least = shares.iter().copied().fold(f64::INFINITY, f64::min);
+        let cells = [name.into(), samples.into(), found.size(), before.into(), after.into(), found.vdp[0].value.into()];
+        table.push(cells.into_iter().chain(shares.into_iter().chain([least]).map(Cell::from)));
     }
     Ok(table)
 }
@@ -167,7 +202,7 @@ impl Seen {
             (0..truth.pixels.len()).filter(|i| is_ground(*i)).map(|i| truth.pixels[i]).collect();
         let background = 100.0 * (1.0 - ground.len() as f64 / truth.pixels.len().max(1) as f64);
         let stops = exposure(ground);
-        let [truth_after, test_after] = [mapped(&truth)?, mapped(&test)?];
+        let [truth_after, test_after] = [mapped(&truth, GREY)?, mapped(&test, GREY)?];
         let vdp = [vdp(&truth, &test, stops)?, vdp(&truth_after, &test_after, 0.0)?];
         Ok(Some(Found { stops, background, truth: [truth, truth_after], test: [test, test_after], vdp }))
     }
@@ -239,13 +274,7 @@ impl Found {
 }
 
 fn vdp(truth: &Picture, test: &Picture, stops: f64) -> Result<Measured> {
-    Measure::Vdp.of(&Pair::new(truth, test)?, &options(stops))
-}
-
-/// The VDP of the tables.
-fn options(stops: f64) -> Options {
-    let display = Display { exposure: Exposure::Stops(stops), curve: ToneCurve::Clip };
-    Options { display, vdp_masking_slope: 1.0, ..Options::default() }
+    Measure::Vdp.of(&Pair::new(truth, test)?, &observer::inexperienced(stops))
 }
 
 /// Percent of pixels in which a channel differs by more than [`CODES`] of the screen's white.
@@ -266,9 +295,9 @@ fn exposure(pixels: Vec<[f32; 3]>) -> f64 {
     if bright > 0.0 { (BRIGHT / bright).log2().clamp(-64.0, 64.0) } else { 0.0 }
 }
 
-/// The picture after Ashikhmin's local operator, as linear light of a screen.
-fn mapped(picture: &Picture) -> Result<Picture> {
-    let settings = Settings { normalize: true, exposure: GREY.log2(), ..Settings::default() };
+/// The picture after Ashikhmin's local operator, as linear light of a screen. `grey`: luminance of its log-average, cd/m².
+fn mapped(picture: &Picture, grey: f32) -> Result<Picture> {
+    let settings = Settings { normalize: true, exposure: grey.log2(), ..Settings::default() };
     let pixels = tonemap::tonemap(picture.width, picture.height, &picture.pixels, &settings);
     Picture::new(picture.width, picture.height, pixels)
 }

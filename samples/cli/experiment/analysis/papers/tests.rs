@@ -84,6 +84,28 @@ fn every_test_and_every_page_that_shows_a_reason_exists() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// A test cannot make the page anew, because its reports take half an hour. But the page must have a row for each number of today's ledgers, and no more.
+#[test]
+fn the_page_in_docs_has_the_numbers_of_the_ledgers() {
+    let page = std::fs::read_to_string(root().join("docs/reproduction.md")).unwrap();
+    let tables = page.split("\n\n").filter(|block| block.starts_with("| place | quantity |"));
+    let mut rows: Vec<&str> = tables.flat_map(|table| table.trim_end().lines().skip(2)).collect();
+    let of =
+        |ledger: Ledger| ledger.number.into_iter().map(|number| format!("| {} | {} | ", number.place, number.what));
+    let mut wanted: Vec<String> = ledgers().into_iter().flat_map(of).collect();
+    assert!(wanted.len() > 400, "{} numbers", wanted.len());
+    wanted.retain(|start| match rows.iter().position(|row| row.starts_with(start.as_str())) {
+        Some(at) => {
+            rows.swap_remove(at);
+            false
+        }
+        None => true,
+    });
+    let how = "make it anew: `lucerna reproduce all --quick -o DIR`, which writes DIR/reproduction.md";
+    assert!(wanted.is_empty(), "docs/reproduction.md lacks {wanted:#?}; {how}");
+    assert!(rows.is_empty(), "docs/reproduction.md has numbers that are in no ledger: {rows:#?}; {how}");
+}
+
 #[test]
 fn rules_hold_where_they_should() {
     let holds = |rule: &str, paper: f64, ours: f64| Rule::parse(rule).unwrap().holds(paper, ours);

@@ -29,7 +29,7 @@ const TABLES_9_10: [(&str, f64); 8] = [
 /// Tables 12 and 13: picture, STM/LTM on both.
 const TABLES_12_13: [(&str, f64, f64); 2] = [("memorial", 3.28, 2.48), ("desk", 1.7, 1.63)];
 /// Tables 14 to 16: picture, VDP % with Sobel, with saliency, SSIM, VDP % of the global operator.
-const TABLES_14_16: [(&str, f64, f64, f64, f64); 2] =
+pub(super) const TABLES_14_16: [(&str, f64, f64, f64, f64); 2] =
     [("memorial", 2.41, 3.62, 0.9876, 5.44), ("desk", 2.72, 2.05, 0.9925, 17.66)];
 
 /// Printed STM/LTM of a size of frames (tables 9, 10) or of a picture (table 12).
