@@ -115,6 +115,9 @@ fn rays(scene: &Scene, bvh: &Bvh, size: u32, vpls: u32) -> Result<Vec<Ray>> {
             lights.push(lamp + direction * hit.t);
         }
     }
+    if lights.len() < vpls as usize {
+        return Err(Error::usage(format!("only {} of {vpls} virtual lights were found", lights.len())));
+    }
     let mut out = Vec::new();
     for pixel in 0..size * size {
         let at = [pixel % size, pixel / size].map(|c| (c as f32 + 0.5) / size as f32 * 2.0 - 1.0);
@@ -214,27 +217,24 @@ fn blocked<const COUNT: bool>(
             continue;
         }
         if !node.is_leaf() {
-            if height + 2 <= stack.len() {
-                stack[height] = node.first_index + 1;
-                stack[height + 1] = node.first_index;
-                height += 2;
-            }
+            assert!(height + 2 <= stack.len(), "the tree is too deep");
+            stack[height] = node.first_index + 1;
+            stack[height + 1] = node.first_index;
+            height += 2;
             continue;
         }
         for slot in node.first_index..node.first_index + node.prim_count {
             let triangle = &triangles[tree.primitive_indices[slot as usize] as usize];
             let between = |near: f32, far: f32| near > ray.t_min && far < ray.t_max;
             if way != Way::Exact {
-                let [min, max] = if way == Way::TreeBoxes {
-                    rounded[index]
-                } else {
+                let (mut near, mut far) = (near, far);
+                if way != Way::TreeBoxes {
                     let [a, b, c] = *triangle;
                     counts.boxes += u64::from(COUNT);
-                    [a.min(b).min(c), a.max(b).max(c)]
-                };
-                let (near, far) = slab(min, max, ray.origin, inverse);
-                if near.max(ray.t_min) > far.min(ray.t_max) {
-                    continue;
+                    (near, far) = slab(a.min(b).min(c), a.max(b).max(c), ray.origin, inverse);
+                    if near.max(ray.t_min) > far.min(ray.t_max) {
+                        continue;
+                    }
                 }
                 if between(near, far) {
                     return true;

@@ -1,5 +1,5 @@
 //! What image-space radiosity costs, pass by pass: a simple against a complex scene, 24, 48 and 80 samples, half and full
-//! resolution. Prints a table and exits with 1 if the cost depends on the scene by more than the tolerance.
+//! resolution; and what shadows of direct light cost. Prints tables and exits with 1 if the cost depends on the scene by more than the tolerance.
 //!
 //! Both scenes fill the picture. The rows that count are without depth-buffer tests of visibility, whose number depends on how
 //! many samples face the pixel; a row with them is printed as well.

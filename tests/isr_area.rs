@@ -71,6 +71,28 @@ fn middle(pixels: &[Vec3]) -> Vec3 {
 }
 
 #[test]
+fn masks_hold_for_light_of_surfaces_that_the_picture_does_not_show() {
+    let scene = builtin::load("cornell").unwrap();
+    with_gpu(|gpu| {
+        let view = View::of_camera(&scene, &Pose::rest(&scene), 0, EXTENT).unwrap();
+        let light = |mask: &str| {
+            let settings = Settings { mask: mask.into(), ..Settings::default() };
+            render(gpu, &scene, &view, &settings)[1].clone()
+        };
+        let whole = mean(&light(""));
+        assert!(whole.min_element() > 0.0);
+        let none = light("white=0,red=0,green=0");
+        assert!(none.iter().all(|pixel| *pixel == Vec3::ZERO), "{}", mean(&none));
+        let ones = mean(&light("white=1,red=1,green=1")) / whole;
+        assert!((ones - 1.0).abs().max_element() < 0.02, "{ones}");
+        // Received and sent light have the factor; light that is scattered more often has it more often.
+        let some = mean(&light("white=0.4,red=0.4,green=0.4")) / whole;
+        println!("0.4 leaves {some} of the light");
+        assert!(some.max_element() < 0.17 && some.min_element() > 0.06, "{some}");
+    });
+}
+
+#[test]
 fn a_plate_under_the_open_sky_has_no_noise() {
     let mut scene = Scene { environment: even_sky(), ..Scene::default() };
     floor(&mut scene, 20.0);

@@ -118,15 +118,20 @@ fn masks_of_materials_scale_received_and_sent_light() {
         for base in [Settings::default(), Settings { cameras: 1, ..Settings::default() }, Settings::paper()] {
             let (whole, direct) = light("", base.clone());
             assert!(whole > 0.0 && direct.iter().any(|light| *light > 0.0));
-            for (mask, share) in
-                [("floor=0.4", 0.4), ("wall=0.4", 0.4), ("floor=0.4,wall=0.2", 0.08), ("wall=0", 0.0), ("wall=1", 1.0)]
-            {
+            for (mask, share) in [
+                ("floor=0.4", 0.4),
+                ("wall=0.4", 0.4),
+                ("floor=0.4,wall=0.2", 0.08),
+                ("wall=0", 0.0),
+                ("floor=0", 0.0),
+                ("wall=1", 1.0),
+            ] {
                 let (found, same) = light(mask, base.clone());
                 let found = found / whole;
                 println!("{mask}: {found:.3} of the light without masks");
                 assert!(same == direct, "{mask}: direct light differs");
-                // The sun on the floor alone makes some thousandths.
-                assert!((found - share).abs() < 0.02 * share + 3e-3, "{mask}: {found}, expected {share}");
+                // The sun on the floor alone makes some thousandths, and the filter brings some of the wall.
+                assert!((found - share).abs() < 0.02 * share + 8e-3, "{mask}: {found}, expected {share}");
             }
         }
         let settings =

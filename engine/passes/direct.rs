@@ -18,7 +18,7 @@ pub struct Lights {
     pub shadows: Buffer,
     /// All shadow maps, an array image.
     pub shadow_maps: Image,
-    /// Number of lights, and the reach of the filter of their shadows over the picture, pixels; 0: none.
+    /// The number of lights, and the reach of the filter of their shadows over the picture, pixels; with a reach of 0 there is no filter.
     pub screen_blur: (u32, u32),
 }
 

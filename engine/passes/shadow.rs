@@ -71,8 +71,8 @@ pub struct Settings {
     /// Offset of the receiver along its normal at grazing angles.
     #[schemars(range(min = 0, max = 1000), extend("x-unit" = "texels", "x-needs" = {"kind": {"not": {"const": "off"}}}))]
     pub normal_bias: f32,
-    /// Reach of a filter over the picture that smooths the shadows of the first 16 lights, to each side. It stops at steps of the depth and at
-    /// creases. 0: no filter. The dissertation proposes such a filter (section 4.6); a filter that does not stop would carry shadows across silhouettes.
+    /// Reach of a filter over the picture that smooths the shadows of the first 16 lights, to each side. It stops at steps of about a
+    /// hundredth of the depth and at creases. 0: no filter. The dissertation proposes such a filter (section 4.6); a filter that does not stop would carry shadows across silhouettes.
     #[schemars(range(min = 0, max = 32), extend("x-unit" = "pixels", "x-needs" = {"kind": {"not": {"const": "off"}}}))]
     pub screen_blur: u32,
 }
@@ -122,7 +122,7 @@ pub struct ShadowMaps {
     pub maps: Image,
     /// Number of lights, and the reach of the filter over the picture, pixels ([`Settings::screen_blur`]).
     pub screen_blur: (u32, u32),
-    /// Lights without shadows because all [`consts::MAX_SHADOW_SLOTS`] maps are taken, and why.
+    /// Lights without shadows because all [`consts::MAX_SHADOW_SLOTS`] maps are taken, and lights whose shadows are not filtered.
     pub notes: Vec<Note>,
 }
 

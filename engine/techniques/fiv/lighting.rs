@@ -34,18 +34,21 @@ impl Lighting {
         (rotating_sky, unturned): (&mut RotatingSky, &mut Option<Arc<OwnedImage>>),
         apart: u32,
     ) -> Result<(Sky, Light)> {
-        let sky = rotating_sky.sky(environment, (self.turn, self.factor), self.still)?.apart(apart);
         if self.still {
+            let sky = rotating_sky.sky(environment, (self.turn, self.factor), true)?.apart(apart);
             let light = Light::with(runner, &sky)?;
             return Ok((sky, light));
         }
         let map = match unturned {
             Some(map) => map,
+            // Before the rotation of the frame, which stays in the cache. Only stored vectors, which never turn, have separated texels.
             None => {
+                debug_assert_eq!(apart, 0);
                 let sky = rotating_sky.sky(environment, (0.0, 1.0), false)?;
                 unturned.insert(light::irradiance_map(runner, &sky)?)
             }
         };
+        let sky = rotating_sky.sky(environment, (self.turn, self.factor), false)?;
         let light = Light::turned(runner, &sky, map, (self.turn, self.factor))?;
         Ok((sky, light))
     }

@@ -55,13 +55,16 @@ impl Masks {
         let mut materials: Vec<types::Material> = handles.material_table.to_vec();
         for &(index, share) in &self.shares {
             if let Some(material) = materials.get_mut(index) {
-                let without = 255 - (share * 255.0).round() as u32;
+                // A small share is not none.
+                let kept = ((share * 255.0).round() as u32).max(u32::from(share > 0.0));
+                let without = 255 - kept;
                 material.flags =
                     material.flags & !(255 << MATERIAL_RADIATION_SHIFT) | without << MATERIAL_RADIATION_SHIFT;
             }
         }
         let mut handles = handles.clone();
         handles.materials = graph.buffer_from("isr.materials", &materials);
+        handles.material_table = materials.into();
         Cow::Owned(handles)
     }
 }

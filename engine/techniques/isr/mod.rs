@@ -194,7 +194,9 @@ pub fn frame(graph: &mut Graph, inputs: &Inputs, settings: &Settings) -> Result<
 
     let first = inputs.senders.filter(|_| settings.indirect);
     let mut senders = first;
-    let unseen = by_rays.filter(|_| settings.fills()).map(|light| unseen::Unseen::new(graph, sender, &coarse, light));
+    let masked = !settings.mask.trim().is_empty();
+    let unseen = by_rays.filter(|_| settings.fills());
+    let unseen = unseen.map(|light| unseen::Unseen::new(graph, sender, &coarse, light, masked));
     // Filtered, with the light of surfaces that the picture does not show.
     let filled = |graph: &mut Graph, gathered: Image, seen: Image, scatterings: u32| {
         let gathered = filter(graph, gathered);

@@ -243,7 +243,8 @@ pub struct Settings {
     #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub receiver: Receiver,
     /// Radiation masks of materials, `NAME=SHARE` with commas between them, for instance `floor=0.5, curtain=0`: the share of the indirect light that
-    /// surfaces of a material receive and send, 0 to 1 [ISR 25]. Empty: 1 for all. Light by rays from the sky and from glowing surfaces arrives in full.
+    /// surfaces of a material receive and send, 0 to 1 in steps of 1/255 [ISR 25]. Empty: 1 for all. Direct light, and light of the sky and of glowing
+    /// surfaces, arrives in full. Masks act where light is gathered, so the blur mixes those of coplanar surfaces. Names with a comma cannot be given.
     #[schemars(extend("x-needs" = {"indirect": {"const": true}}))]
     pub mask: String,
     /// Power of indirect light. The area estimator needs no balancing: 1.

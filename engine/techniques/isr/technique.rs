@@ -2,7 +2,7 @@
 
 use std::convert::Infallible;
 
-use super::{Area, PictureSettings, Surroundings, picture};
+use super::{Area, PictureSettings, Surroundings, mask::Masks, picture};
 use crate::{
     Result,
     graph::Graph,
@@ -89,6 +89,9 @@ impl Technique for Isr {
 
     fn ready(making: Making<'_, Infallible>, settings: &PictureSettings) -> Result<Self> {
         let Making { gpu, scene, resident, .. } = making;
+        // Before long work, and for pictures without indirect light too.
+        let names: Vec<String> = scene.materials.iter().map(|material| material.name.clone()).collect();
+        Masks::by_names(&names, &settings.isr.mask)?;
         let area = Area::new(gpu, scene, resident, &settings.isr)?;
         Ok(Self { ambient: scene.into(), area })
     }

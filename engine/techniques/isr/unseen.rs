@@ -16,11 +16,15 @@ pub(super) struct Unseen {
     lamps: Image,
     light: Image,
     kept: Image,
+    /// Coarse; alpha is the radiation mask.
+    albedo: Image,
+    /// Materials have masks ([`super::Settings::mask`]).
+    masked: bool,
 }
 
 impl Unseen {
-    /// `sender`: the radiance that surfaces send without each other's light, and their mask.
-    pub fn new(graph: &mut Graph, sender: Image, coarse: &Coarse, light: AreaLight) -> Self {
+    /// `sender`: the radiance that surfaces send without each other's light, and their mask. `masked`: materials have masks.
+    pub fn new(graph: &mut Graph, sender: Image, coarse: &Coarse, light: AreaLight, masked: bool) -> Self {
         let extent = graph.extent(sender);
         let desc = ImageDesc::new(Format::RGBA16F, extent).all_mips();
         let [sum, kept] = ["isr.unseen.light", "isr.unseen.kept"].map(|name| graph.image_with(name, desc));
@@ -30,12 +34,13 @@ impl Unseen {
             lamps: light.lamps,
             light: sum.mip(0),
             kept: kept.mip(0),
+            push: unseen_terms::Push { masked: masked.into() },
         };
         graph.compute(args, extent);
         for image in [sum, kept] {
             graph.mips(image);
         }
-        Self { lamps: light.lamps, light: sum, kept }
+        Self { lamps: light.lamps, light: sum, kept, albedo: coarse.albedo, masked }
     }
 
     /// Gathered light (rgb for a white receiver) with that of all surfaces around. `seen`: r is the sum of the form factors of the senders. `share`: brightness of
@@ -43,9 +48,9 @@ impl Unseen {
     pub fn filled(&self, graph: &mut Graph, gathered: Image, seen: Image, share: f32, scatterings: u32) -> Image {
         let extent = graph.extent(gathered);
         let filled = graph.image("isr.unseen.filled", Format::RGBA16F, extent);
-        let Self { lamps, light, kept } = *self;
-        let push = unseen::Push { scatterings, share };
-        graph.compute(unseen::Args { gathered, seen, lamps, light, kept, filled, push }, extent);
+        let Self { lamps, light, kept, albedo, masked } = *self;
+        let push = unseen::Push { scatterings, share, masked: masked.into() };
+        graph.compute(unseen::Args { gathered, seen, lamps, light, kept, filled, albedo, push }, extent);
         filled
     }
 }

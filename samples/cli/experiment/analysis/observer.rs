@@ -1,4 +1,4 @@
-//! The observer of the visible differences predictor in all tables of Michael's thesis (sections 5.3 and 5.4): one for both chapters.
+//! The observer of the visible differences predictor in all tables of Michael's thesis: one for sections 5.3 and 5.4.
 
 use lucerna::measure::{Display, Exposure, Options, ToneCurve};
 
