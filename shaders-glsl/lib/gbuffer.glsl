@@ -1,6 +1,6 @@
 // Encodings of the G-buffer (passes::gbuffer). Attachments:
 //   albedo   sRGB8 + A8   rgb: (1 - metallic) base colour, sampled linear; a: radiation mask (1 ordinary, 0 unlit,
-//                       between them for materials with a mask of image-space radiosity)
+//                       or the share that `isr.mask` gives to a material)
 //   normal   RGBA8 world normal c * 2 - 1 (a = 0), or RG16 octahedral (a reads as 1)
 //   depth    R32F eye distance / far; background exactly 1
 //   specular RGBA8 rgb: reflectance at normal incidence F0; a: roughness

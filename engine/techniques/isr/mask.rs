@@ -55,7 +55,7 @@ impl Masks {
         let mut materials: Vec<types::Material> = handles.material_table.to_vec();
         for &(index, share) in &self.shares {
             if let Some(material) = materials.get_mut(index) {
-                // A small share is not none.
+                // A share above 0 stays above 0.
                 let kept = ((share * 255.0).round() as u32).max(u32::from(share > 0.0));
                 let without = 255 - kept;
                 material.flags =

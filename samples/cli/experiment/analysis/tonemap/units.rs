@@ -20,9 +20,9 @@ const EXPOSURE: &str = "tonemap.exposure";
 pub(super) fn section(views: &[View<'_>]) -> Result<Option<Section>> {
     let mut section = Section::new("Tables 14 to 16 by the unit of the pictures");
     section.text(
-        "The threshold of 0.1 and the local operator both depend on the unit of luminance, and the thesis does not print the unit of its pictures. A file of the format Radiance whose values are \
-         radiances has 179 cd/m² to a unit of its green-weighted value, and `Tree` states 621 cd/m² for white; the other pictures state nothing. *Unit*: luminance of the value 1 that is taken, cd/m². The row with unit 1 \
-         has the values as they are in the file. *Log-average*: of the luminance in this unit. All rows are against local tone mapping in the same unit, with the averages of the definition. *Global / Sobel*: how many times as many pixels differ with the global operator.",
+        "The threshold of 0.1 and the local operator both depend on the unit of luminance, and the thesis does not print the unit of its pictures. A file of the format Radiance holds \
+         radiances, of which one unit is 179 cd/m², and `Tree` states 621 cd/m² for white; the other pictures state nothing. *Unit*: luminance of the value 1 that is taken, cd/m². The row with unit 1 \
+         has the values as they are in the file. *Log-average*: of the luminance in this unit. All rows are against local tone mapping in the same unit, with the averages of the definition. *Global / Sobel*: share of visible differences with the global operator over that with selection by Sobel.",
     );
     let columns = [
         "picture",
