@@ -11,12 +11,12 @@ mod sets;
 
 use lucerna::{
     Result,
-    gpu::{BufferDesc, DeviceKind, Gpu, GpuOptions, OwnedBuffer},
+    gpu::{BufferDesc, Gpu, GpuOptions, OwnedBuffer},
     graph::{Graph, Runner},
     rays::Rays,
     resident::Resident,
     scene::{self, LoadOptions, Pose, Scene},
-    shaders::{consts, test::trace_at as shader, types},
+    shaders::{test::trace_at as shader, types},
 };
 use lucerna_scenes as builtin;
 use std::path::PathBuf;
@@ -191,12 +191,9 @@ impl Device<'_> {
             _ => self.rays.frame(&mut graph, &handles),
         };
         let count = rays.len() as u32;
-        let stacks_in_memory = self.gpu.caps().kind == DeviceKind::Cpu;
         let buffer = |name, size| OwnedBuffer::new(&self.gpu, name, BufferDesc::device(size));
         let rays = OwnedBuffer::with_contents(&self.gpu, "rays", bytemuck::cast_slice(rays))?;
         let hits = buffer("hits", u64::from(count) * size_of::<types::Hit>() as u64)?;
-        let depth = if stacks_in_memory { u64::from(consts::TRACE_DEPTH) } else { 0 };
-        let stacks = buffer("stacks", 4 * (depth * u64::from(count).next_multiple_of(64)).max(1))?;
         let args = shader::Args {
             trace_nodes: traced.trace_nodes,
             trace_triangles: traced.trace_triangles,
@@ -212,17 +209,12 @@ impl Device<'_> {
             push: shader::Push {
                 rays_at: rays.address_words(),
                 hits_at: hits.address_words(),
-                stacks_at: stacks.address_words(),
                 count: if mode == Mode::Idle { 0 } else { count },
             },
-            spec: shader::Spec {
-                any: u32::from(any),
-                count: u32::from(mode == Mode::Count),
-                stacks_in_memory: u32::from(stacks_in_memory),
-            },
+            spec: shader::Spec { any: u32::from(any), count: u32::from(mode == Mode::Count) },
         };
-        let [rays, hits, stacks] = [rays, hits, stacks].map(|buffer| graph.import_buffer(&buffer));
-        graph.compute(args, count).reading(rays).writing(hits).writing(stacks);
+        let [rays, hits] = [rays, hits].map(|buffer| graph.import_buffer(&buffer));
+        graph.compute(args, count).reading(rays).writing(hits);
         let token = graph.read_buffer(hits);
         let before = busy();
         let frame = self.runner.run(graph)?;

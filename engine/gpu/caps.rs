@@ -24,6 +24,8 @@ pub struct Caps {
     /// Shaders may use ray queries, and acceleration structures can be built: the device can, and
     /// [`super::GpuOptions::ray_query`] does not forbid it.
     pub ray_query: bool,
+    /// Traversals of trees in compute sort the nodes that a ray meets ([`super::Traversal`]).
+    pub ordered_rays: bool,
     pub float_atomic_add: bool,
     /// Colour targets of four floats can be blended.
     pub blend_float32: bool,
@@ -70,7 +72,7 @@ pub struct Limits {
 }
 
 impl Caps {
-    pub(crate) fn new(candidate: &Candidate, instance: &ash::Instance, ray_query: bool) -> Self {
+    pub(crate) fn new(candidate: &Candidate, instance: &ash::Instance, [ray_query, ordered_rays]: [bool; 2]) -> Self {
         let f = &candidate.features;
         let on = |flag: vk::Bool32| flag == vk::TRUE;
         let limits = &candidate.properties.limits;
@@ -99,6 +101,7 @@ impl Caps {
             multiview: on(f.v11.multiview),
             image_cube_array: on(f.core.image_cube_array),
             ray_query,
+            ordered_rays,
             blend_float32: floats.optimal_tiling_features.contains(blends),
             float_atomic_add: on(f.float_atomics.shader_buffer_float32_atomic_add),
             sampled_array_dynamic_indexing: on(f.core.shader_sampled_image_array_dynamic_indexing),

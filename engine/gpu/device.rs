@@ -23,7 +23,7 @@ use super::{
     facts::{Candidate, Features, candidates},
     fault::{Latch, failed},
     instance::{Instance, no_driver},
-    options::{GpuOptions, RayQuery, Validation},
+    options::{GpuOptions, RayQuery, Traversal, Validation},
     pipeline::PipelineCache,
     sampler::SamplerKey,
     select::{DeviceFacts, DeviceKind, Requirements, refusal, select},
@@ -299,7 +299,12 @@ impl Context {
             RayQuery::Off => false,
         };
         let ray_query = wanted && candidate.facts.lacks_of_ray_query().is_empty();
-        let caps = Caps::new(&candidate, &instance.raw, ray_query);
+        let ordered_rays = match options.traversal {
+            Traversal::Auto => candidate.facts.kind == DeviceKind::Cpu,
+            Traversal::Ordered => true,
+            Traversal::Grouped => false,
+        };
+        let caps = Caps::new(&candidate, &instance.raw, [ray_query, ordered_rays]);
         let facts = &candidate.facts;
         let (queue_family, _) =
             candidate.queue_family.ok_or_else(|| Error::new(ErrorKind::NoDevice, "the chosen device has no queue"))?;

@@ -97,6 +97,34 @@ impl FromStr for RayQuery {
     }
 }
 
+/// How traversals of trees in compute choose the next node (`lib/trace_order.glsl`). Both ways find the same hits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Traversal {
+    /// Ordered on CPU drivers, where it is faster; grouped on GPUs, where it has not been measured.
+    #[default]
+    Auto,
+    /// Nodes sorted by the time at which the ray enters them; the top of the stack is in registers.
+    Ordered,
+    /// Groups of slots in the order of the ray's octant; a stack of one word a level.
+    Grouped,
+}
+
+impl FromStr for Traversal {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        match text.trim().to_ascii_lowercase().as_str() {
+            "auto" => Ok(Self::Auto),
+            "ordered" => Ok(Self::Ordered),
+            "grouped" => Ok(Self::Grouped),
+            other => {
+                Err(Error::usage(format!("traversal `{other}` is not known"))
+                    .help("Allowed are auto, ordered and grouped"))
+            }
+        }
+    }
+}
+
 /// How to open a device.
 #[derive(Clone, Debug)]
 pub struct GpuOptions {
@@ -105,6 +133,7 @@ pub struct GpuOptions {
     pub require_gpu: bool,
     pub validation: Validation,
     pub ray_query: RayQuery,
+    pub traversal: Traversal,
     /// Log validation messages as warnings as they come (at most ten of one kind).
     pub print_messages: bool,
     /// After this time a wait logs a warning that names the pass in flight, once per doubling.
@@ -127,6 +156,7 @@ impl Default for GpuOptions {
             require_gpu: false,
             validation: Validation::Off,
             ray_query: RayQuery::Auto,
+            traversal: Traversal::Auto,
             print_messages: true,
             soft_limit: Duration::from_secs(10),
             hard_limit: None,
@@ -138,11 +168,15 @@ impl Default for GpuOptions {
 }
 
 /// The variables that [`GpuOptions::from_env`] reads, with their meaning; for `--help` and documentation.
-pub const ENVIRONMENT: [(&str, &str); 6] = [
+pub const ENVIRONMENT: [(&str, &str); 7] = [
     ("LUCERNA_DEVICE", "auto, cpu, an index, or part of a device name or UUID"),
     ("LUCERNA_REQUIRE_GPU", "1: refuse CPU drivers"),
     ("LUCERNA_VALIDATION", "off, core, sync or gpu-assisted"),
     ("LUCERNA_RAY_QUERY", "auto (GPUs that have it), on (CPU drivers too; refuse devices without) or off"),
+    (
+        "LUCERNA_TRAVERSAL",
+        "auto (ordered on CPU drivers), ordered or grouped: how rays in compute choose the next node",
+    ),
     ("LUCERNA_WAIT_LIMIT", "seconds after which a wait for the device gives up"),
     ("LUCERNA_POISON", "1: fill new device memory with NaN"),
 ];
@@ -169,6 +203,9 @@ impl GpuOptions {
         }
         if let Some(value) = variable("LUCERNA_RAY_QUERY") {
             options.ray_query = value.parse().map_err(|e: Error| e.at("LUCERNA_RAY_QUERY"))?;
+        }
+        if let Some(value) = variable("LUCERNA_TRAVERSAL") {
+            options.traversal = value.parse().map_err(|e: Error| e.at("LUCERNA_TRAVERSAL"))?;
         }
         if let Some(value) = variable("LUCERNA_WAIT_LIMIT") {
             options.hard_limit = Some(seconds(&value).map_err(|e| e.at("LUCERNA_WAIT_LIMIT"))?);
@@ -213,6 +250,7 @@ mod tests {
             ("LUCERNA_REQUIRE_GPU", "maybe"),
             ("LUCERNA_VALIDATION", "loud"),
             ("LUCERNA_RAY_QUERY", "maybe"),
+            ("LUCERNA_TRAVERSAL", "fast"),
             ("LUCERNA_WAIT_LIMIT", "-1"),
             ("LUCERNA_WAIT_LIMIT", "1e300"),
             ("LUCERNA_POISON", "2"),

@@ -7,10 +7,11 @@ use ash::vk;
 use super::{
     Gpu,
     device::{Context, lock},
+    modules::Modules,
 };
 use crate::{
     Error, ErrorKind, Result,
-    shader::{BindingKind, Shader, Stage, StageCode},
+    shader::{BindingKind, ENGINE_SPEC, Shader, Stage},
 };
 
 /// What to bind to run a shader. The handles live as long as the device.
@@ -228,15 +229,18 @@ fn make(
     let entries: Vec<_> = shader
         .spec
         .iter()
+        .map(|constant| constant.id)
+        .chain([ENGINE_SPEC])
         .enumerate()
-        .map(|(i, constant)| vk::SpecializationMapEntry { constant_id: constant.id, offset: 4 * i as u32, size: 4 })
+        .map(|(i, constant_id)| vk::SpecializationMapEntry { constant_id, offset: 4 * i as u32, size: 4 })
         .collect();
-    let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(spec));
+    let values = [spec, &[u32::from(context.caps.ordered_rays)]].concat();
+    let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(bytemuck::cast_slice(&values));
     let modules = Modules::new(context, shader)?;
     let stages: Vec<_> = shader
         .stages
         .iter()
-        .zip(&modules.list)
+        .zip(modules.list())
         .map(|(code, module)| {
             vk::PipelineShaderStageCreateInfo::default()
                 .stage(stage_flag(code.stage))
@@ -389,65 +393,6 @@ fn alpha_factor(factor: vk::BlendFactor) -> vk::BlendFactor {
         vk::BlendFactor::ONE_MINUS_DST_COLOR => vk::BlendFactor::ONE_MINUS_DST_ALPHA,
         vk::BlendFactor::ONE_MINUS_SRC_COLOR => vk::BlendFactor::ONE_MINUS_SRC_ALPHA,
         other => other,
-    }
-}
-
-/// The SPIR-V of a stage.
-#[cfg(not(feature = "replaceable-shaders"))]
-fn module_of(code: &StageCode) -> Result<std::borrow::Cow<'static, [u8]>> {
-    Ok(code.spirv.into())
-}
-
-/// The SPIR-V of a stage: a file of its name in the folder that the variable `LUCERNA_SHADERS` names, if there is one, takes its place.
-#[cfg(feature = "replaceable-shaders")]
-fn module_of(code: &StageCode) -> Result<std::borrow::Cow<'static, [u8]>> {
-    let Some(folder) = std::env::var_os("LUCERNA_SHADERS") else { return Ok(code.spirv.into()) };
-    let file = std::path::Path::new(&folder).join(code.file);
-    match std::fs::read(&file) {
-        Ok(bytes) => Ok(bytes.into()),
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(code.spirv.into()),
-        Err(error) => Err(Error::input("a shader cannot be read").caused_by(error).in_file(file)),
-    }
-}
-
-/// Shader modules, needed only while a pipeline is made.
-struct Modules<'a> {
-    context: &'a Context,
-    list: Vec<vk::ShaderModule>,
-}
-
-impl<'a> Modules<'a> {
-    fn new(context: &'a Context, shader: &Shader) -> Result<Self> {
-        let mut modules = Self { context, list: Vec::new() };
-        for code in shader.stages {
-            let (stage, spirv) = (code.stage, module_of(code)?);
-            if spirv.len() % 4 != 0 {
-                return Err(Error::new(
-                    ErrorKind::Runtime,
-                    format!("the SPIR-V of shader `{}` has {} bytes", shader.name, spirv.len()),
-                ));
-            }
-            // A byte slice need not be aligned for words.
-            let words: Vec<u32> = spirv.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
-            let info = vk::ShaderModuleCreateInfo::default().code(&words);
-            // SAFETY: the code was made and checked by the compiler at build time.
-            let made = unsafe { context.device.create_shader_module(&info, None) };
-            modules.list.push(
-                context.check(made, || {
-                    format!("vkCreateShaderModule for the {stage:?} stage of shader `{}`", shader.name)
-                })?,
-            );
-        }
-        Ok(modules)
-    }
-}
-
-impl Drop for Modules<'_> {
-    fn drop(&mut self) {
-        for module in &self.list {
-            // SAFETY: pipelines do not need their modules once made.
-            unsafe { self.context.device.destroy_shader_module(*module, None) };
-        }
     }
 }
 

@@ -2,7 +2,7 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-use super::{Gpu, GpuOptions, RayQuery, Validation};
+use super::{Gpu, GpuOptions, RayQuery, Traversal, Validation};
 use crate::ErrorKind;
 
 /// One device test of a process runs at a time. The validation layer finds the device of each call in a table that has no lock (seen in
@@ -59,6 +59,7 @@ pub fn run(options: GpuOptions, body: impl FnOnce(&Gpu)) -> Result<(), String> {
         device: environment.device,
         require_gpu: environment.require_gpu,
         ray_query: if options.ray_query == RayQuery::Auto { environment.ray_query } else { options.ray_query },
+        traversal: if options.traversal == Traversal::Auto { environment.traversal } else { options.traversal },
         poison: options.poison || environment.poison,
         validation: if options.validation == Validation::GpuAssisted { options.validation } else { Validation::Sync },
         ..options

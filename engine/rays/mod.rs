@@ -221,13 +221,15 @@ impl Rays {
                 first_instance: if shape.merged { 0 } else { usage.first_instance },
                 root: shape.root,
                 reach: reach(&bounds.transformed(&inverse)),
+                only: 0,
             });
         }
         let top = Tree::eighths(&boxes);
         debug_assert!(top.nodes.len() <= self.top_nodes as usize);
         let ordered = top.order.iter().map(|i| places[*i as usize]);
         let all = boxes.iter().copied().fold(Aabb::EMPTY, Aabb::union);
-        let world = types::TraceInstance { root: 0, reach: reach(&all), ..Default::default() };
+        let only = u32::from(places.len() == 1);
+        let world = types::TraceInstance { root: 0, reach: reach(&all), only, ..Default::default() };
         let instances = std::iter::once(world).chain(ordered).collect();
         (top, instances)
     }

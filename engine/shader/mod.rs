@@ -57,6 +57,10 @@ pub enum Stage {
     Fragment,
 }
 
+/// Number of the specialisation constant that the engine sets itself, for every shader: 1 where
+/// [`crate::gpu::Caps::ordered_rays`]. build.rs leaves it out of the interface.
+pub(crate) const ENGINE_SPEC: u32 = 31;
+
 /// A resource that a shader binds.
 #[derive(Debug)]
 pub struct Binding {

@@ -127,6 +127,8 @@ struct Walk {
 // Capabilities, decorations and storage classes of the SPIR-V specification that matter here.
 const RAY_QUERY: u32 = 4472;
 const SPEC_ID: u32 = 1;
+/// The specialisation constant that the engine sets itself (lib/trace_order.glsl); it is no part of a pass's interface.
+pub const ENGINE_SPEC: u32 = 31;
 const ARRAY_STRIDE: u32 = 6;
 const MATRIX_STRIDE: u32 = 7;
 const NON_WRITABLE: u32 = 24;
@@ -410,7 +412,7 @@ pub fn reflect(words: &[u32]) -> Result<Interface, String> {
         }
     }
     for &id in &w.spec {
-        let Some(spec_id) = w.decoration(id, SPEC_ID) else { continue };
+        let Some(spec_id) = w.decoration(id, SPEC_ID).filter(|id| *id != ENGINE_SPEC) else { continue };
         let (default, ty) = w.constants[&id];
         let ty = match w.types.get(&ty) {
             Some(Raw::Bool) => return Err(format!("{}: a bool specialisation constant; use uint", w.name(id))),

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::{
     Result,
-    gpu::{BufferDesc, DeviceKind, Gpu, OwnedBuffer, OwnedImage},
+    gpu::{BufferDesc, Gpu, OwnedBuffer, OwnedImage},
     graph::{Buffer, Graph},
     rays::{Rays, traced},
     resident::{Handles, Resident},
@@ -51,8 +51,6 @@ struct Paths {
     states: OwnedBuffer,
     hits: OwnedBuffer,
     lists: OwnedBuffer,
-    /// The traversal's stacks on CPU drivers; one word on other devices, which keep them in their own way.
-    stacks: OwnedBuffer,
     /// Counts of paths of even and of odd turns.
     counts: [OwnedBuffer; 2],
 }
@@ -146,8 +144,6 @@ impl Kernel {
         let surfaces = longest(scene, &job.settings);
         let capacity = MOST_SLOTS.min(job.slots());
         let states = capacity * size_of::<types::PathState>() as u64;
-        let stacks =
-            if self.stacks_in_memory() { u64::from(consts::TRACE_DEPTH) * capacity.next_multiple_of(64) } else { 1 };
         let counts = place_of_count(surfaces + 1, 0);
         if self.paths.as_ref().is_none_or(|p| p.states.size() < states || p.counts[0].size() < counts) {
             let buffer = |name, desc| OwnedBuffer::new(&self.gpu, name, desc);
@@ -155,7 +151,6 @@ impl Kernel {
                 states: buffer("tracer.paths", BufferDesc::device(states))?,
                 hits: buffer("tracer.hits", BufferDesc::device(capacity * size_of::<types::Hit>() as u64))?,
                 lists: buffer("tracer.lists", BufferDesc::device(u64::from(consts::PATH_LISTS) * 4 * capacity))?,
-                stacks: buffer("tracer.stacks", BufferDesc::device(4 * stacks))?,
                 counts: [
                     buffer("tracer.even counts", BufferDesc::device(counts))?,
                     buffer("tracer.odd counts", BufferDesc::device(counts))?,
@@ -163,11 +158,6 @@ impl Kernel {
             });
         }
         Ok(Cut { surfaces, capacity, turns })
-    }
-
-    /// CPU drivers write to arrays for one invocation after the other.
-    fn stacks_in_memory(&self) -> bool {
-        self.gpu.caps().kind == DeviceKind::Cpu
     }
 
     /// The maximum of rays per surface of a path, and the kind of each ray.
@@ -213,8 +203,6 @@ impl Kernel {
         let states = graph.import_buffer(&paths.states);
         let hits = graph.import_buffer(&paths.hits);
         let lists = graph.import_buffer(&paths.lists);
-        let stacks = graph.import_buffer(&paths.stacks);
-        let stacks_in_memory = self.stacks_in_memory().into();
         let counts = [graph.import_buffer(&paths.counts[0]), graph.import_buffer(&paths.counts[1])];
         let surface = shader::Args {
             view,
@@ -268,10 +256,10 @@ impl Kernel {
             let (first, sample_index) = ((offset + first) as u32, sample as u32);
             let rays = |graph: &mut Graph, turn: u32, way: u32| {
                 let counts = counts[turn as usize % 2];
-                let spec = path_trace::Spec { to_lights: u32::from(way != consts::ON), stacks_in_memory };
+                let spec = path_trace::Spec { to_lights: u32::from(way != consts::ON) };
                 let push = path_trace::Push { first, sample_index, turn, way };
                 let args = path_trace::Args { counts, spec, push, ..trace };
-                graph.compute_indirect(args, counts, place_of_count(turn, way)).writing(stacks).rays(count.into());
+                graph.compute_indirect(args, counts, place_of_count(turn, way)).rays(count.into());
             };
             for number in 0..cut.surfaces {
                 rays(graph, number, consts::ON);
@@ -338,7 +326,6 @@ impl Kernel {
             light_nodes_at: lights.nodes.address_words(),
             light_targets_at: lights.targets.address_words(),
             environment_at: self.environment_edges.address_words(),
-            stacks_at: paths.stacks.address_words(),
             plan: settings.plan(),
         }
     }

@@ -14,6 +14,8 @@ layout(binding = 42, scalar) readonly buffer TraceInstances { TraceInstance trac
 #define TRACE_NODES(i) TraceNodesAt(scene_at.nodes).of[i]
 #define TRACE_TRIANGLES(i) VectorsOf4At(scene_at.triangles).of[i]
 
+#include "lib/trace_order.glsl"
+
 // A ray as the nodes of one tree see it.
 struct TraceSlabs {
     vec3 origin;
@@ -56,9 +58,9 @@ vec4 trace_smaller(vec4 a, vec4 b) {
     return vec4(a.x < b.x ? a.x : b.x, a.y < b.y ? a.y : b.y, a.z < b.z ? a.z : b.z, a.w < b.w ? a.w : b.w);
 }
 
-// Which of four boxes the ray meets between t_min and t_max: bounds in steps, near ones first.
-uint trace_boxes(uvec3 near_words, uvec3 far_words, vec3 step_time, vec3 near_time, vec3 far_time, float t_min, float t_max) {
-    vec4 near = trace_larger(trace_bytes(near_words.x) * step_time.x + near_time.x, trace_bytes(near_words.y) * step_time.y + near_time.y);
+// Which of four boxes the ray meets between t_min and t_max, and when it enters them: bounds in steps, near ones first.
+uint trace_boxes(uvec3 near_words, uvec3 far_words, vec3 step_time, vec3 near_time, vec3 far_time, float t_min, float t_max, out vec4 near) {
+    near = trace_larger(trace_bytes(near_words.x) * step_time.x + near_time.x, trace_bytes(near_words.y) * step_time.y + near_time.y);
     near = trace_larger(trace_larger(near, trace_bytes(near_words.z) * step_time.z + near_time.z), vec4(t_min));
     vec4 far = trace_smaller(trace_bytes(far_words.x) * step_time.x + far_time.x, trace_bytes(far_words.y) * step_time.y + far_time.y);
     far = trace_smaller(trace_smaller(far, trace_bytes(far_words.z) * step_time.z + far_time.z), vec4(t_max));
@@ -71,8 +73,8 @@ uint trace_boxes(uvec3 near_words, uvec3 far_words, vec3 step_time, vec3 near_ti
     return uint(hit.x) | uint(hit.y) << 1u | uint(hit.z) << 2u | uint(hit.w) << 3u;
 }
 
-// Slots of a node that the ray meets, as bits; also words 4 and 5 of the node.
-uint trace_node(uint node, TraceSlabs slabs, float t_min, float t_max, out uvec2 children) {
+// Slots of a node that the ray meets, as bits; also words 4 and 5 of the node, and the times at which the ray enters the boxes.
+uint trace_node(uint node, TraceSlabs slabs, float t_min, float t_max, out uvec2 children, out vec4 enter[2]) {
     uint w = 5u * node;
     uvec4 a = TRACE_NODES(w), b = TRACE_NODES(w + 1u), c = TRACE_NODES(w + 2u), d = TRACE_NODES(w + 3u);
     uvec2 e = TRACE_NODES(w + 4u).xy;
@@ -84,23 +86,15 @@ uint trace_node(uint node, TraceSlabs slabs, float t_min, float t_max, out uvec2
     uvec3 low0 = uvec3(b.z, c.x, c.z), low1 = uvec3(b.w, c.y, c.w);
     uvec3 high0 = uvec3(d.x, d.z, e.x), high1 = uvec3(d.y, d.w, e.y);
     bvec3 backward = lessThan(slabs.inverse, vec3(0.0));
+    uint first = trace_boxes(mix(low0, high0, backward), mix(high0, low0, backward), step_time, near_time, far_time, t_min, t_max, enter[0]);
 #ifdef TRACE_BOXES
-    uint first = trace_boxes(mix(low0, high0, backward), mix(high0, low0, backward), step_time, near_time, far_time, t_min, t_max);
     uint first_between = trace_between;
-    uint second = trace_boxes(mix(low1, high1, backward), mix(high1, low1, backward), step_time, near_time, far_time, t_min, t_max);
-    trace_between = first_between | trace_between << 4u;
-    return first | second << 4u;
-#else
-    return trace_boxes(mix(low0, high0, backward), mix(high0, low0, backward), step_time, near_time, far_time, t_min, t_max)
-        | trace_boxes(mix(low1, high1, backward), mix(high1, low1, backward), step_time, near_time, far_time, t_min, t_max) << 4u;
 #endif
-}
-
-// Moves bit i of a byte to bit i ^ octant.
-uint trace_permuted(uint bits, uint octant) {
-    bits = (octant & 1u) != 0u ? (bits & 0x55u) << 1u | (bits >> 1u & 0x55u) : bits;
-    bits = (octant & 2u) != 0u ? (bits & 0x33u) << 2u | (bits >> 2u & 0x33u) : bits;
-    return (octant & 4u) != 0u ? (bits & 0x0fu) << 4u | bits >> 4u : bits;
+    uint second = trace_boxes(mix(low1, high1, backward), mix(high1, low1, backward), step_time, near_time, far_time, t_min, t_max, enter[1]);
+#ifdef TRACE_BOXES
+    trace_between = first_between | trace_between << 4u;
+#endif
+    return first | second << 4u;
 }
 
 // Order in which the rasteriser draws surfaces with these bits: opaque ones first, single-sided before double-sided ones
@@ -128,35 +122,25 @@ struct Traversal {
     uint above_slots;
     bool inside;       // of an instance
     bool done;
-    uint height;       // of trace_stack
+    uint height;       // of the stack
+    int first_step;    // of the times in the stack
     int left;          // turns
 };
 
-// Entries: a node and the slots that are still to be visited, permuted so that bit 0 is the nearest; 0: the tree's end.
-uint trace_stack[TRACE_DEPTH];
-// With TRACE_STACKS_AT and a specialisation constant STACKS_IN_MEMORY of 1 the stacks are in memory at that address, TRACE_DEPTH words for each
-// invocation. CPU drivers write to an array for one lane after the other, and to addresses for all lanes at once.
-#ifdef TRACE_STACKS_AT
-layout(buffer_reference, scalar, buffer_reference_align = 4) buffer TraceStacksAt { uint of[]; };
-// The stacks of 64 invocations lie side by side.
-#define TRACE_STACK_WORD(at) TraceStacksAt(TRACE_STACKS_AT).of[gl_GlobalInvocationID.x / 64u * 64u * TRACE_DEPTH + 64u * (at) + gl_GlobalInvocationID.x % 64u]
-#endif
-
-uint trace_stacked(uint at) {
-#ifdef TRACE_STACKS_AT
-    if (STACKS_IN_MEMORY != 0u) return TRACE_STACK_WORD(at);
-#endif
-    return trace_stack[at];
-}
-
-void trace_stack_set(uint at, uint entry) {
-#ifdef TRACE_STACKS_AT
-    if (STACKS_IN_MEMORY != 0u) {
-        TRACE_STACK_WORD(at) = entry;
-        return;
-    }
-#endif
-    trace_stack[at] = entry;
+// Down into an instance.
+void trace_enter(inout Traversal t, uint place) {
+    trace_push(t.height, t.next);
+    trace_push(t.height, 0u);
+    TraceInstance instance = trace_instances[place];
+    vec4 x = instance.object_from_world[0], y = instance.object_from_world[1], z = instance.object_from_world[2];
+    Ray ray = t.ray;
+    vec3 origin = vec3(dot(x.xyz, ray.origin) + x.w, dot(y.xyz, ray.origin) + y.w, dot(z.xyz, ray.origin) + z.w);
+    vec3 direction = vec3(dot(x.xyz, ray.direction), dot(y.xyz, ray.direction), dot(z.xyz, ray.direction));
+    t.slabs = trace_slabs(origin, direction, instance.reach);
+    t.shear = trace_shear(direction);
+    t.first_instance = instance.first_instance;
+    t.next = instance.root;
+    t.inside = true;
 }
 
 Traversal trace_begin(Ray ray, uint mask, uint salt) {
@@ -166,10 +150,7 @@ Traversal trace_begin(Ray ray, uint mask, uint salt) {
     t.salt = salt;
     t.hit = Hit(ray.t_max, vec2(0.0), NONE, NONE);
     t.best = NONE;
-    t.slabs = trace_slabs(ray.origin, ray.direction, trace_instances[0].reach);
-    t.shear = trace_shear(ray.direction);
     t.first_instance = 0u;
-    t.next = trace_instances[0].root;
     t.leaves = 0u;
     t.leaf_slots = 0u;
     t.boxes = 0u;
@@ -177,36 +158,39 @@ Traversal trace_begin(Ray ray, uint mask, uint salt) {
     t.above_slots = 0u;
     t.inside = false;
     t.done = false;
-    trace_stack_set(0u, 0u);
-    t.height = 1u;
+    t.first_step = trace_first_step(trace_instances[0].reach, ray.direction);
+    t.height = 0u;
     t.left = int(TRACE_STEPS);
+    if (trace_instances[0].only != 0u) {
+        // The top tree has one leaf; the ray begins inside.
+        t.next = NONE;
+        trace_enter(t, 1u);
+    } else {
+        t.slabs = trace_slabs(ray.origin, ray.direction, trace_instances[0].reach);
+        t.shear = trace_shear(ray.direction);
+        t.next = trace_instances[0].root;
+        trace_push(t.height, 0u);
+    }
     return t;
 }
 
 // Visits a node: its leaves that the ray meets, and the next node.
 void trace_visit(inout Traversal t, bool any) {
     uvec2 children;
-    uint hits = trace_node(t.next, t.slabs, t.ray.t_min, t.hit.t, children);
+    vec4 enter[2];
+    uint hits = trace_node(t.next, t.slabs, t.ray.t_min, t.hit.t, children, enter);
     t.leaves = children.y;
     t.leaf_slots = hits & t.leaves & 0xffu;
 #ifdef TRACE_BOXES
     t.boxes = IMPERFECT != 0u && any && t.inside ? trace_between & t.leaf_slots : 0u;
     t.leaf_slots &= ~t.boxes;
 #endif
-    uint slots = trace_permuted(hits & children.x & 0xffu, t.slabs.octant);
-    uint entry = t.next << 8u | slots;
-    uint nodes = children.x;
-    if (slots == 0u) {
-        entry = trace_stacked(--t.height);
-        nodes = TRACE_NODES(5u * (entry >> 8u) + 1u).x;
-    }
-    if (entry == 0u) {
-        t.next = NONE;
+    uint slots = hits & children.x & 0xffu;
+    if (TRACE_ORDERED != 0u && !any) {
+        t.next = trace_next_in_order(t.height, children.x, slots, enter, t.hit.t, t.first_step);
     } else {
-        uint slot = uint(findLSB(entry)) ^ t.slabs.octant;
-        t.next = (nodes >> 8u) + uint(bitCount(nodes & ((1u << slot) - 1u)));
-        entry &= entry - 1u;
-        if ((entry & 0xffu) != 0u) trace_stack_set(t.height++, entry);
+        // Bit 0 of a permuted byte is the far corner's slot; the nearest hit is looked for from the near corner.
+        t.next = trace_next_of_group(t.height, t.next, children.x, slots, enter, any ? t.slabs.octant : t.slabs.octant ^ 7u);
     }
 }
 
@@ -261,24 +245,13 @@ void trace_one(inout Traversal t, bool any) {
 }
 
 // Down into the next instance.
-void trace_enter(inout Traversal t) {
+void trace_enter_next(inout Traversal t) {
     uint slot = uint(findLSB(t.leaf_slots));
     uint place = (t.leaves >> 8u) + uint(bitCount(t.leaves & ((1u << slot) - 1u)));
     t.above = t.leaves;
     t.above_slots = t.leaf_slots & (t.leaf_slots - 1u);
     t.leaf_slots = 0u;
-    trace_stack_set(t.height++, t.next);
-    trace_stack_set(t.height++, 0u);
-    TraceInstance instance = trace_instances[place];
-    vec4 x = instance.object_from_world[0], y = instance.object_from_world[1], z = instance.object_from_world[2];
-    Ray ray = t.ray;
-    vec3 origin = vec3(dot(x.xyz, ray.origin) + x.w, dot(y.xyz, ray.origin) + y.w, dot(z.xyz, ray.origin) + z.w);
-    vec3 direction = vec3(dot(x.xyz, ray.direction), dot(y.xyz, ray.direction), dot(z.xyz, ray.direction));
-    t.slabs = trace_slabs(origin, direction, instance.reach);
-    t.shear = trace_shear(direction);
-    t.first_instance = instance.first_instance;
-    t.next = instance.root;
-    t.inside = true;
+    trace_enter(t, place);
 }
 
 // Up again.
@@ -287,7 +260,8 @@ void trace_leave(inout Traversal t) {
     t.slabs = trace_slabs(t.ray.origin, t.ray.direction, trace_instances[0].reach);
     t.leaves = t.above;
     t.leaf_slots = t.above_slots;
-    t.next = trace_stacked(--t.height);
+    t.next = trace_pop(t.height);
+    t.done = t.leaf_slots == 0u && t.next == NONE;
 }
 
 #ifdef TRACE_BOXES
@@ -325,7 +299,7 @@ void trace_step(inout Traversal t, bool any) {
         trace_one(t, any);
         if (t.leaf_slots == 0u && t.next == NONE && !t.done) trace_leave(t);
     } else {
-        if (t.leaf_slots != 0u) trace_enter(t);
+        if (t.leaf_slots != 0u) trace_enter_next(t);
         else if (t.next == NONE) t.done = true;
     }
     t.done = t.done || t.left <= 0;

@@ -9,6 +9,7 @@ struct TraceInstance {
     uint first_instance;       // added to the instances of the records
     uint root;                 // node
     float reach;               // no coordinate in the tree is larger
+    uint only;                 // of the top tree: 1 if it has one instance
 };
 
 // Words of a node (Ylitie, Karras and Laine, "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017,

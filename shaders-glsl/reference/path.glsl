@@ -47,7 +47,6 @@ struct PathSettings {
     uvec2 light_nodes_at;
     uvec2 light_targets_at;
     uvec2 environment_at;
-    uvec2 stacks_at;           // of the traversal (lib/trace_compute.glsl)
     uint plan;                 // of the random numbers (lib/points.glsl)
 };
 

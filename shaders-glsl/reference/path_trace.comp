@@ -13,11 +13,8 @@
 layout(local_size_x = 64) in;
 // 1: rays to lights, which end at any hit.
 layout(constant_id = 0) const uint TO_LIGHTS = 0u;
-// 1: the stacks of the traversal are in memory (lib/trace_compute.glsl).
-layout(constant_id = 1) const uint STACKS_IN_MEMORY = 0u;
 
 layout(binding = 13, scalar) uniform SettingsBlock { PathSettings settings; };
-#define TRACE_STACKS_AT settings.stacks_at
 #include "lib/trace.glsl"
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };

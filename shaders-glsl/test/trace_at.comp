@@ -1,4 +1,4 @@
-// Many rays through the ray interface, for the benchmark: rays, hits and stacks by address, as in reference/path_trace.comp.
+// Many rays through the ray interface, for the benchmark: rays and hits by address, as in reference/path_trace.comp.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -9,16 +9,13 @@
 layout(local_size_x = 64) in;
 layout(constant_id = 0) const uint ANY = 0; // 1: whether anything is hit; only `instance` is written then, 0 for a hit
 layout(constant_id = 1) const uint COUNT = 0; // 1: `triangle` becomes the turns of the loops
-layout(constant_id = 2) const uint STACKS_IN_MEMORY = 0u;
 
 layout(push_constant, scalar) uniform Push {
     uvec2 rays_at;
     uvec2 hits_at;
-    uvec2 stacks_at;
     uint count;
 };
 
-#define TRACE_STACKS_AT stacks_at
 #include "lib/trace.glsl"
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) readonly buffer RaysAt { Ray of[]; };

@@ -21,6 +21,8 @@ mod edges;
 mod layered;
 #[path = "../rays_exact.rs"]
 mod rays_exact;
+#[path = "../rays_order.rs"]
+mod rays_order;
 #[path = "../rays_query.rs"]
 mod rays_query;
 #[path = "../rays_scenes.rs"]
