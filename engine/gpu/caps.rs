@@ -71,8 +71,17 @@ pub struct Limits {
     pub accel_scratch_alignment: u64,
 }
 
+/// How rays are traced on a device.
+#[derive(Clone, Copy)]
+pub(crate) struct Traced {
+    /// By ray query instead of in compute.
+    pub by_query: bool,
+    /// [`Caps::ordered_rays`].
+    pub ordered: bool,
+}
+
 impl Caps {
-    pub(crate) fn new(candidate: &Candidate, instance: &ash::Instance, [ray_query, ordered_rays]: [bool; 2]) -> Self {
+    pub(crate) fn new(candidate: &Candidate, instance: &ash::Instance, traced: Traced) -> Self {
         let f = &candidate.features;
         let on = |flag: vk::Bool32| flag == vk::TRUE;
         let limits = &candidate.properties.limits;
@@ -100,8 +109,8 @@ impl Caps {
             shader_output_layer: on(f.v12.shader_output_layer),
             multiview: on(f.v11.multiview),
             image_cube_array: on(f.core.image_cube_array),
-            ray_query,
-            ordered_rays,
+            ray_query: traced.by_query,
+            ordered_rays: traced.ordered,
             blend_float32: floats.optimal_tiling_features.contains(blends),
             float_atomic_add: on(f.float_atomics.shader_buffer_float32_atomic_add),
             sampled_array_dynamic_indexing: on(f.core.shader_sampled_image_array_dynamic_indexing),

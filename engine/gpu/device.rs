@@ -18,7 +18,7 @@ use gpu_allocator::{
 };
 
 use super::{
-    caps::Caps,
+    caps::{Caps, Traced},
     exit::skip_foreign_handlers,
     facts::{Candidate, Features, candidates},
     fault::{Latch, failed},
@@ -304,7 +304,7 @@ impl Context {
             Traversal::Ordered => true,
             Traversal::Grouped => false,
         };
-        let caps = Caps::new(&candidate, &instance.raw, [ray_query, ordered_rays]);
+        let caps = Caps::new(&candidate, &instance.raw, Traced { by_query: ray_query, ordered: ordered_rays });
         let facts = &candidate.facts;
         let (queue_family, _) =
             candidate.queue_family.ok_or_else(|| Error::new(ErrorKind::NoDevice, "the chosen device has no queue"))?;

@@ -97,6 +97,27 @@ fn specialisation_constants_keep_their_defaults() {
     assert!(text.contains(&format!("scale: f32::from_bits({})", 0.5f32.to_bits())), "{text}");
 }
 
+#[test]
+fn the_engines_constant_is_no_part_of_an_interface_and_its_number_is_taken() {
+    let with = |line: &str| {
+        let name = line.split(' ').nth(3).unwrap();
+        comp(&format!(
+            "{line} = 0u;\nlayout(binding = 0, scalar) writeonly buffer O {{ uint o[]; }};\nvoid main() {{ o[0] = {name}; }}"
+        ))
+    };
+    assert!(with("layout(constant_id=31) const uint TRACE_ORDERED").unwrap().interface.spec.is_empty());
+    for (line, part) in [
+        (
+            "layout(constant_id=31) const uint MINE",
+            "MINE: constant_id 31 is the engine's (TRACE_ORDERED); use another number",
+        ),
+        ("layout(constant_id=7) const uint TRACE_ORDERED", "TRACE_ORDERED: constant_id 7"),
+    ] {
+        let error = with(line).unwrap_err();
+        assert!(error.contains(part), "{error}");
+    }
+}
+
 const TRACE: &str = "#ifdef TRACE_QUERY\nlayout(binding = 47) uniform accelerationStructureEXT top;\n#else\nlayout(binding = \
     40, scalar) readonly buffer Nodes { float nodes[]; };\n#endif\nlayout(binding = 0, scalar) writeonly buffer O { float o[]; };\n";
 

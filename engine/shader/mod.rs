@@ -60,6 +60,8 @@ pub enum Stage {
 /// Number of the specialisation constant that the engine sets itself, for every shader: 1 where
 /// [`crate::gpu::Caps::ordered_rays`]. build.rs leaves it out of the interface.
 pub(crate) const ENGINE_SPEC: u32 = 31;
+#[cfg(any(test, feature = "effects"))]
+const _: () = assert!(ENGINE_SPEC == reflect::ENGINE_SPEC.0);
 
 /// A resource that a shader binds.
 #[derive(Debug)]

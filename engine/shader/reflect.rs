@@ -127,8 +127,8 @@ struct Walk {
 // Capabilities, decorations and storage classes of the SPIR-V specification that matter here.
 const RAY_QUERY: u32 = 4472;
 const SPEC_ID: u32 = 1;
-/// The specialisation constant that the engine sets itself (lib/trace_order.glsl); it is no part of a pass's interface.
-pub const ENGINE_SPEC: u32 = 31;
+/// Number and name of the specialisation constant that the engine sets itself (lib/trace_order.glsl); it is no part of a pass's interface.
+pub const ENGINE_SPEC: (u32, &str) = (31, "TRACE_ORDERED");
 const ARRAY_STRIDE: u32 = 6;
 const MATRIX_STRIDE: u32 = 7;
 const NON_WRITABLE: u32 = 24;
@@ -412,7 +412,15 @@ pub fn reflect(words: &[u32]) -> Result<Interface, String> {
         }
     }
     for &id in &w.spec {
-        let Some(spec_id) = w.decoration(id, SPEC_ID).filter(|id| *id != ENGINE_SPEC) else { continue };
+        let Some(spec_id) = w.decoration(id, SPEC_ID) else { continue };
+        let (engines, name) = ENGINE_SPEC;
+        if spec_id == engines && w.name(id) != name {
+            return Err(format!("{}: constant_id {engines} is the engine's ({name}); use another number", w.name(id)));
+        } else if w.name(id) == name && spec_id != engines {
+            return Err(format!("{name}: constant_id {spec_id}; this constant is the engine's and has {engines}"));
+        } else if spec_id == engines {
+            continue;
+        }
         let (default, ty) = w.constants[&id];
         let ty = match w.types.get(&ty) {
             Some(Raw::Bool) => return Err(format!("{}: a bool specialisation constant; use uint", w.name(id))),

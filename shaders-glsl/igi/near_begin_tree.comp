@@ -21,7 +21,7 @@ void main() {
     if (tree_nodes[at].state != TREE_SURFACE) return;
     near_paths[at].position = tree_nodes[at].position;
     near_paths[at].normal = tree_nodes[at].normal;
-    near_paths[at].salt = pcg4d(uvec4(tree_nodes[at].pixel, at % TREE_WIDTH, 0x7ee5u, 0u)).x;
+    near_paths[at].salt = pcg4d(uvec4(tree_nodes[at].pixel, tree_branch(at), 0x7ee5u, 0u)).x;
     near_paths[at].side = tree_nodes[at].normal;
     near_paths[at].gap = tree_nodes[at].gap;
     near_paths[at].weight = vec3(1.0 / float(paths));

@@ -26,6 +26,23 @@ struct TreeNode {
 
 layout(binding = 70, scalar) buffer TreeNodes { TreeNode tree_nodes[]; };
 
+// Slots whose nodes lie together, of the same branch side by side: most trees have one or two nodes, and neighbouring invocations are to
+// have as much to do as each other.
+const uint TREE_BLOCK = 64u;
+
+// Number of a node.
+uint tree_node_of(uint slot, uint branch) {
+    return (slot / TREE_BLOCK * TREE_WIDTH + branch) * TREE_BLOCK + slot % TREE_BLOCK;
+}
+
+uint tree_slot(uint node) {
+    return node / (TREE_BLOCK * TREE_WIDTH) * TREE_BLOCK + node % TREE_BLOCK;
+}
+
+uint tree_branch(uint node) {
+    return node / TREE_BLOCK % TREE_WIDTH;
+}
+
 // Pixel of a slot. Slots are ordered by blocks of 8 × 8 pixels, so that the rays of a workgroup are close to each other.
 uvec2 pixel_of(uint slot, uvec2 extent) {
     uint blocks = (extent.x + 7u) / 8u;

@@ -41,7 +41,7 @@ void main() {
     TreeNode node = tree_nodes[at];
     Brdf brdf = lit_brdf(node.albedo, node.f0, node.roughness, dot(node.normal, node.direction));
     LitPoint p = LitPoint(node.position, node.position + node.normal * node.gap, node.normal, node.direction, brdf);
-    uvec2 place = uvec2(node.pixel, at % TREE_WIDTH);
+    uvec2 place = uvec2(node.pixel, tree_branch(at));
     vec3 sum = vec3(0.0);
     uint last = min(first + count, direct_rays());
     for (uint i = first; i < last; ++i) {

@@ -31,7 +31,7 @@ void main() {
         vec3 light = vpl_irradiance(vpl, node.position, node.normal, least);
         if (light == vec3(0.0)) continue;
         vec3 to = vpl.position + vpl.normal * vpl.gap - origin;
-        uint salt = pcg4d(uvec4(node.pixel, at % TREE_WIDTH, k, seed)).x;
+        uint salt = pcg4d(uvec4(node.pixel, tree_branch(at), k, seed)).x;
         if (!trace_any(Ray(origin, 0.0, to, 0.99999), TRACE_SHADOW, salt)) sum += light;
     }
     tree_nodes[at].light = node.light + node.weight * node.albedo * (sum / 3.14159265358979);

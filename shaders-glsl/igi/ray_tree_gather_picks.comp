@@ -32,8 +32,8 @@ void main() {
     if (at >= nodes || tree_nodes[at].state != TREE_SURFACE) return;
     TreeNode node = tree_nodes[at];
     vec3 origin = node.position + node.normal * node.gap;
-    float offset = vpl_offset(uvec2(node.pixel & 0xffffu, node.pixel >> 16u), at % TREE_WIDTH, TREE_WIDTH, seed);
-    Receiver receiver = Receiver(node.position, node.normal, origin, offset, uvec2(node.pixel, at % TREE_WIDTH));
+    float offset = vpl_offset(uvec2(node.pixel & 0xffffu, node.pixel >> 16u), tree_branch(at), TREE_WIDTH, seed);
+    Receiver receiver = Receiver(node.position, node.normal, origin, offset, uvec2(node.pixel, tree_branch(at)));
     vec3 sum = vpl_picked(receiver, Picking(picks, proposals, leaves, least, seed), first, count).rgb;
     tree_nodes[at].light = node.light + node.weight * node.albedo * (sum / 3.14159265358979);
 }

@@ -45,10 +45,9 @@ void leave(inout TreeNode node, HitSurface s, bool through, vec3 toward) {
 }
 
 void main() {
-    uint slot = gl_GlobalInvocationID.x / TREE_WIDTH;
-    uint branch = gl_GlobalInvocationID.x % TREE_WIDTH;
-    if (slot >= count) return;
     uint at = gl_GlobalInvocationID.x;
+    uint slot = tree_slot(at), branch = tree_branch(at);
+    if (slot >= count) return;
     uvec2 extent = uvec2(view.extent);
     TreeNode node;
     float near = view.near / view.far, z = 1.0;
@@ -63,8 +62,8 @@ void main() {
             vec3(1.0), 1.0, vec3(0.0, 1.0, 0.0), pixel.x | pixel.y << 16u, vec3(0.0), vec3(0.0), vec3(0.0));
         // Clears the nodes that the previous range of pixels may have filled.
         for (uint other = 1u; other < TREE_WIDTH; ++other) {
-            tree_nodes[at + other].state = TREE_EMPTY;
-            tree_nodes[at + other].light = vec3(0.0);
+            tree_nodes[tree_node_of(slot, other)].state = TREE_EMPTY;
+            tree_nodes[tree_node_of(slot, other)].light = vec3(0.0);
         }
     } else {
         // Other nodes cannot hold a ray at this level.
@@ -129,7 +128,7 @@ void main() {
                         mirrored.weight *= f;
                         mirrored.light = vec3(0.0);
                         leave(mirrored, s, false, toward);
-                        tree_nodes[at + free] = mirrored;
+                        tree_nodes[tree_node_of(slot, branch + free)] = mirrored;
                         node.weight *= (1.0 - f) * passes;
                         leave(node, s, true, toward);
                     } else {

@@ -20,6 +20,6 @@ void main() {
     uvec2 pixel = pixel_of(first + slot, extent);
     if (any(greaterThanEqual(pixel, extent))) return;
     vec3 sum = vec3(0.0);
-    for (uint branch = 0u; branch < TREE_WIDTH; ++branch) sum += tree_nodes[TREE_WIDTH * slot + branch].light;
+    for (uint branch = 0u; branch < TREE_WIDTH; ++branch) sum += tree_nodes[tree_node_of(slot, branch)].light;
     imageStore(sharp, ivec2(pixel), vec4(sum, imageLoad(sharp, ivec2(pixel)).a));
 }
