@@ -202,11 +202,17 @@ fn truth(gpu: &Gpu, scene: &Scene, at: Vec3, normal: Vec3) -> [f64; 3] {
     let a = normal.any_orthonormal_vector();
     let b = normal.cross(a);
     stage.quad(white, at - 1e-3 * (a + b), a * 2e-3, b * 2e-3);
-    // Many pixels with few samples: the validation layer counts passes.
+    // Many pixels with few samples, because each pass costs time in the validation layer.
     let eye = view(at + 0.01 * normal, at, 5.0, [64, 64]);
-    let settings =
-        Settings { bounces: 16, roulette: 16, diffuse_only: true, filter: Filter::Centre, ..Settings::default() };
-    let layers = render(gpu, &stage.scene, &eye, &settings, 2);
+    let settings = Settings {
+        bounces: 16,
+        roulette: 16,
+        diffuse_only: true,
+        filter: Filter::Centre,
+        planned: 8,
+        ..Settings::default()
+    };
+    let layers = render(gpu, &stage.scene, &eye, &settings, 8);
     crate::tracer_lab::mean(&layers, "indirect").map(|radiance| PI * radiance)
 }
 

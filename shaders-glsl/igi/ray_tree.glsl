@@ -26,8 +26,8 @@ struct TreeNode {
 
 layout(binding = 70, scalar) buffer TreeNodes { TreeNode tree_nodes[]; };
 
-// Slots whose nodes lie together, of the same branch side by side: most trees have one or two nodes, and neighbouring invocations are to
-// have as much to do as each other.
+// The nodes of one branch of this many slots lie side by side. Most trees have one or two nodes, so this gives neighbouring invocations equal
+// work. A range of pixels has a multiple of this many slots.
 const uint TREE_BLOCK = 64u;
 
 // Number of a node.
