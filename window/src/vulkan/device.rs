@@ -1,6 +1,6 @@
 //! The logical device: its choice, its memory, and owners of its objects.
 
-use super::instance::Surface;
+use super::surface::Surface;
 use crate::error::{Error, vk_error};
 use ash::{khr, vk};
 use std::ptr::NonNull;

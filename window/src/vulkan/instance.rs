@@ -1,12 +1,12 @@
-//! The Vulkan instance, its validation messages, and the window's surface.
+//! The Vulkan instance and its validation messages.
 
+use super::surface;
 use crate::error::{Error, vk_error};
 use ash::{ext, khr, vk};
 use std::ffi::{CStr, c_void};
 use std::rc::Rc;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
+use winit::raw_window_handle::HasDisplayHandle;
 use winit::window::Window;
 
 const VALIDATION_LAYER: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -26,7 +26,7 @@ pub struct Instance {
     pub raw: ash::Instance,
     pub surfaces: khr::surface::Instance,
     messenger: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
-    entry: ash::Entry,
+    pub entry: ash::Entry,
 }
 
 impl Instance {
@@ -35,9 +35,7 @@ impl Instance {
         let entry = unsafe { ash::Entry::load() }
             .map_err(|e| Error::NoDevice(format!("The Vulkan loader is not installed: {e}")))?;
         let display = window.display_handle().map_err(|e| Error::Window(format!("The window has no display: {e}")))?;
-        let mut extensions = ash_window::enumerate_required_extensions(display.as_raw())
-            .map_err(|e| vk_error("vkEnumerateInstanceExtensionProperties", e))?
-            .to_vec();
+        let mut extensions = surface::extensions(display.as_raw())?;
         let mut layers = Vec::new();
         if validation {
             if !has_validation_layer(&entry)? {
@@ -123,30 +121,4 @@ unsafe extern "system" fn on_message(
         log::error!("Vulkan validation: {}", message.unwrap_or_default().to_string_lossy());
     }
     vk::FALSE
-}
-
-/// The part of a window that Vulkan presents to. It keeps the window alive.
-pub struct Surface {
-    pub raw: vk::SurfaceKHR,
-    pub instance: Rc<Instance>,
-    pub window: Arc<Window>,
-}
-
-impl Surface {
-    pub fn new(instance: &Rc<Instance>, window: &Arc<Window>) -> Result<Rc<Self>, Error> {
-        let no_handle = |e| Error::Window(format!("The window has no handle: {e}"));
-        let display = window.display_handle().map_err(no_handle)?.as_raw();
-        let handle = window.window_handle().map_err(no_handle)?.as_raw();
-        // SAFETY: the surface holds the window, so both handles stay valid as long as the surface.
-        let raw = unsafe { ash_window::create_surface(&instance.entry, &instance.raw, display, handle, None) }
-            .map_err(|e| vk_error("vkCreateSurfaceKHR", e))?;
-        Ok(Rc::new(Self { raw, instance: instance.clone(), window: window.clone() }))
-    }
-}
-
-impl Drop for Surface {
-    fn drop(&mut self) {
-        // SAFETY: swapchains hold an `Rc` of the surface, so none is left.
-        unsafe { self.instance.surfaces.destroy_surface(self.raw, None) };
-    }
 }

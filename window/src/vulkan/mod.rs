@@ -5,6 +5,7 @@ mod frame;
 mod instance;
 mod painter;
 mod pipeline;
+mod surface;
 mod swapchain;
 mod texture;
 
@@ -14,11 +15,11 @@ use ash::vk;
 use device::Device;
 use egui::ClippedPrimitive;
 use frame::Frame;
-use instance::Surface;
 pub use instance::{Instance, validation_messages};
 use painter::Painter;
 use std::rc::Rc;
 use std::sync::Arc;
+use surface::Surface;
 use swapchain::Swapchain;
 use winit::window::Window;
 

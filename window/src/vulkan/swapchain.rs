@@ -1,7 +1,7 @@
 //! The images that the window shows in turn.
 
 use super::device::{Device, Owned};
-use super::instance::Surface;
+use super::surface::Surface;
 use crate::error::{Error, vk_error};
 use ash::vk;
 use std::rc::Rc;

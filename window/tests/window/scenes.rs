@@ -3,6 +3,7 @@
 use crate::desktop::{Desktop, until};
 use egui::{Color32, ColorImage, Pos2, Rect, TextureHandle, TextureOptions, ViewportCommand};
 use lucerna_window::{App, Error, Options, Waker, run, validation_messages};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -16,6 +17,7 @@ pub const ALL: &[(&str, fn())] = &[
     ("resizes", resizes),
     ("minimised", minimised),
     ("calm", calm),
+    ("keys", keys),
     ("closing", closing),
     ("two_losses", two_losses),
     ("three_losses", three_losses),
@@ -23,6 +25,7 @@ pub const ALL: &[(&str, fn())] = &[
 
 const TITLE: &str = "a window under test";
 const SIDE: usize = 256;
+const KEYS: u64 = 800;
 /// Where the pictures are painted: nearest filtering, linear filtering, an `egui::Image`.
 const PLACES: [[i16; 2]; 3] = [[37, 21], [301, 23], [41, 290]];
 
@@ -40,6 +43,7 @@ struct Seen {
     size: [u32; 2],
     closed: bool,
     close_requests: u64,
+    keys: u64,
 }
 
 struct Tested {
@@ -88,6 +92,8 @@ impl App for Tested {
         seen.frames += 1;
         seen.size = [screen.width() as u32, screen.height() as u32];
         seen.close_requests += u64::from(close);
+        let pressed = |event: &&egui::Event| matches!(event, egui::Event::Key { key: egui::Key::K, pressed: true, .. });
+        seen.keys += context.input(|i| i.events.iter().filter(pressed).count()) as u64;
     }
 
     fn closing(&mut self) {
@@ -327,6 +333,31 @@ fn calm() {
             println!("       {what}: {frames} frames");
             assert!(frames <= 6, "{what} made {frames} frames");
         }
+        test.order(Order::Send(ViewportCommand::Close));
+    });
+    result.unwrap();
+}
+
+/// A key that is pressed while the display takes a picture is heard at once. The driver's thread and the event loop both read messages of
+/// the X server then, and busy cores change which is the first.
+fn keys() {
+    let (result, _) = with_window(options(), |test| {
+        test.shows(&noise([SIDE; 2], 1));
+        test.desktop.focus();
+        let done = Arc::new(AtomicBool::new(false));
+        let busy = || {
+            let done = done.clone();
+            std::thread::spawn(move || while !done.load(Ordering::Relaxed) {})
+        };
+        let threads: Vec<_> = (0..3).map(|_| busy()).collect();
+        for round in 1..=KEYS {
+            test.waker.wake();
+            std::thread::sleep(Duration::from_micros(8_000 + round * 7919 % 4_000));
+            test.desktop.hit(u32::from('k'));
+            until("the key is heard", || test.seen().keys == round);
+        }
+        done.store(true, Ordering::Relaxed);
+        threads.into_iter().for_each(|thread| thread.join().unwrap());
         test.order(Order::Send(ViewportCommand::Close));
     });
     result.unwrap();
