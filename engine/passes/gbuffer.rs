@@ -81,6 +81,8 @@ pub struct GBuffer {
     pub hardware: Image,
     /// The view for which the G-buffer was drawn.
     pub view: Uniform<types::View>,
+    /// The settings with which it was drawn.
+    pub settings: Settings,
 }
 
 /// Draws the scene as `view` sees it.
@@ -118,6 +120,7 @@ pub fn draw_eyes(
         emission: both.emission.layer(eye),
         hardware: both.hardware.layer(eye),
         view,
+        settings: *settings,
     };
     let right = graph.uniform(&views[1].uniform());
     [of_eye(0, both.view), of_eye(1, right)]
@@ -158,6 +161,7 @@ fn empty(graph: &mut Graph, scene: &Handles, view: &View, layers: u32, settings:
         emission: image("gbuffer.emission", Format::RGBA16F),
         hardware: image("gbuffer.hardware", scene.depth_stencil),
         view: graph.uniform(&view.uniform()),
+        settings: *settings,
     }
 }
 

@@ -6,6 +6,7 @@ pub mod blur;
 pub mod compose;
 pub mod direct;
 pub mod downsample;
+pub mod edges;
 pub mod gbuffer;
 pub mod matte;
 pub mod motion;

@@ -13,6 +13,7 @@ pub use readback::{Readback, raw};
 
 use std::{convert::Infallible, fmt::Debug, path::Path};
 
+use glam::Vec2;
 use serde::{Serialize, de::DeserializeOwned};
 
 use crate::{
@@ -20,7 +21,7 @@ use crate::{
     bake::Digest,
     gpu::Gpu,
     graph::{Extent, Graph},
-    passes::{matte, temporal},
+    passes::{edges, matte, temporal},
     resident::{Handles, Resident},
     scene::{Note, Pose, Scene, View, chosen::Chosen},
     settings::Description,
@@ -128,12 +129,15 @@ pub struct Shot<M> {
     /// Temporal anti-aliasing: the total is the average over the frames. The caller shifts each frame's view ([`temporal::place`]), and all
     /// frames have one `Runner`. The other layers are those of the frame.
     pub temporal: Option<temporal::Settings>,
+    /// Smooth edges of the total by further places inside each pixel, which have no light of their own ([`edges::smooth`]). The other layers
+    /// are those of the middles.
+    pub edges: Option<[Vec2; edges::PLACES]>,
 }
 
 impl<M: Mode> Default for Shot<M> {
     /// One frame at second 0 with all layers.
     fn default() -> Self {
-        Self { seconds: 0.0, frames: 1, mode: M::default(), layers: true, temporal: None }
+        Self { seconds: 0.0, frames: 1, mode: M::default(), layers: true, temporal: None, edges: None }
     }
 }
 
@@ -253,7 +257,7 @@ impl<T: Technique> Ready<T> {
     /// Declares one frame of the scene. The far plane of `view` is fitted to the scene in `pose`.
     ///
     /// # Errors
-    /// As [`Technique::frame`]; `Usage` for temporal anti-aliasing of a picture that is not radiance or has no G-buffer, and for a matte of a
+    /// As [`Technique::frame`]; `Usage` for anti-aliasing of a picture that is not radiance or has no G-buffer, and for a matte of a
     /// picture without G-buffer or of two eyes.
     pub fn frame(
         &mut self,
@@ -268,14 +272,20 @@ impl<T: Technique> Ready<T> {
         let moment = Moment { scene, pose, handles: &handles, view, shot, notes: self.resident.notes() };
         let mut picture = self.technique.frame(graph, &moment, settings)?;
         let mut shown = view;
+        let radiance = picture.gbuffer.filter(|_| shot.mode.is_radiance());
+        let without = |at| {
+            let what = format!("{} has no radiance with a G-buffer in mode {}", T::NAME, shot.mode.name());
+            Error::usage(what).at(at).help("Leave this anti-aliasing out")
+        };
+        if let Some(places) = &shot.edges {
+            let gbuffer = radiance.ok_or_else(|| without("edges"))?;
+            picture.total = edges::smooth(graph, &handles, (&gbuffer, &view), picture.total, places)?;
+        }
         if let Some(settings) = shot.temporal {
-            let Some(gbuffer) = picture.gbuffer.filter(|_| shot.mode.is_radiance()) else {
-                let what = format!("{} has no radiance with a G-buffer in mode {}", T::NAME, shot.mode.name());
-                return Err(Error::usage(what).at("temporal").help("Leave temporal anti-aliasing out"));
-            };
+            let gbuffer = radiance.ok_or_else(|| without("temporal"))?;
             picture.total = temporal::accumulate(graph, &handles, (&gbuffer, &view), picture.total, settings)?;
             // The average stands at the middles of the pixels.
-            shown = view.shifted(glam::Vec2::ZERO);
+            shown = view.shifted(Vec2::ZERO);
         }
         if let Some(chosen) = &self.chosen {
             let of_view = |image| graph.extent(image) == Extent::from(view.extent);

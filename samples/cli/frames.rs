@@ -89,8 +89,9 @@ pub fn frames<T: Technique>(
         }
         let seconds = args.stage.time + f64::from(frame) / args.fps;
         let (pose, view) = run.stage.at(seconds, args.stage.size)?;
-        let (frames, temporal) = (run.frames.len() as u32, run.smooth.temporal());
-        let shot = Shot { seconds, frames, mode: given.mode, layers, temporal };
+        let frames = run.frames.len() as u32;
+        let (temporal, edges) = (run.smooth.temporal(), run.smooth.edges());
+        let shot = Shot { seconds, frames, mode: given.mode, layers, temporal, edges };
         let of = OfFrame { frame, pose, view, shot };
         if args.list_passes {
             let (mut graph, mut picture) = work.declared(run, &of, run.smooth.place(frame), work.seed(run, frame))?;
@@ -214,7 +215,7 @@ impl<T: Technique> Work<'_, T> {
         let Rendered { layers, frame, view } = rendered;
         let report = frame.report.clone();
         drop(frame);
-        if run.smooth.temporal.is_some() {
+        if run.smooth.is_of_the_total() {
             run.name_exact(of_the_frame(&layers));
         }
         self.write(run, of, (layers, view), begun, progress, |time| vec![(time, report)])

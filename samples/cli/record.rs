@@ -221,6 +221,9 @@ impl Record {
             let allowed = format!("1 to {}, with one picture a frame", temporal::MOST);
             return wrong("aa.temporal", frames.to_string(), &allowed);
         }
+        if self.aa.edges && (self.aa.count > 1 || self.aa.temporal.is_some()) {
+            return wrong("aa.edges", "true".into(), "true with one picture a frame that is not averaged over time");
+        }
         for (key, value) in [("time", self.time), ("exposure", self.exposure)] {
             if !value.is_finite() {
                 return wrong(key, value.to_string(), "finite numbers");
@@ -410,6 +413,7 @@ mod tests {
             (Record { aa: Smooth { count: 0, ..Smooth::default() }, ..record.clone() }, "aa.count"),
             (Record { aa: Smooth { temporal: Some(8), ..record.aa }, ..record.clone() }, "aa.temporal"),
             (Record { aa: Smooth { temporal: Some(0), ..Smooth::default() }, ..record.clone() }, "aa.temporal"),
+            (Record { aa: Smooth { edges: true, ..record.aa }, ..record.clone() }, "aa.edges"),
             (Record { unit: Some(-1.0), ..record.clone() }, "unit"),
             (Record { frame: 1, ..record.clone() }, "frame"),
             (Record { frame: u32::MAX, ..record.clone() }, "frame"),

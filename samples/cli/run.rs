@@ -229,10 +229,15 @@ impl<'a> Run<'a> {
     }
 
     /// Chooses the anti-aliasing by the device, if the user has not. Stills are means of several pictures, which a GPU renders in little time with
-    /// every technique. The average over time of a sequence flickers while the camera rests, so sequences have it on request alone.
+    /// every technique; where one picture takes a CPU driver seconds, its light serves all places inside the pixels. The average over time of
+    /// a sequence flickers while the camera rests, so sequences have it on request alone.
     pub fn smooth_on(&mut self, gpu: &Gpu) {
-        if self.unasked.is_some_and(|cheap| cheap || gpu.describe().kind != DeviceKind::Cpu) {
-            self.smooth.count = smooth::STILL;
+        if let Some(cheap) = self.unasked {
+            let quick = cheap || gpu.describe().kind != DeviceKind::Cpu;
+            self.smooth = match quick {
+                true => Smooth { count: smooth::STILL, ..self.smooth },
+                false => Smooth { edges: true, ..self.smooth },
+            };
         }
         self.record.aa = self.smooth;
     }
@@ -425,13 +430,16 @@ fn smoothing(args: &RenderArgs, technique: &Label) -> Result<Smooth> {
     if let Some((option, _)) = single.into_iter().find(|(_, given)| *given && matches!(aa, Some(Aa::Mean(2..)))) {
         return wrong(format!("the argument '--aa <N>' cannot be used with '{option}'"), "Leave one of them out");
     }
-    if frames.is_some() && matches!(aa, Some(Aa::Mean(_))) {
-        let what = "'--aa-frames <N>' is for --aa temporal, and --aa asks for the mean of pictures".to_owned();
+    if frames.is_some() && matches!(aa, Some(Aa::Mean(_) | Aa::Edges)) {
+        let what =
+            "'--aa-frames <N>' is for --aa temporal, and --aa asks for the mean of pictures, or for edges".to_owned();
         return wrong(what, "Leave --aa-frames out, or give --aa temporal");
     }
+    let one = Smooth { filter, ..Smooth::default() };
     Ok(match aa {
-        Some(Aa::Mean(count)) => Smooth { count, filter, temporal: None },
-        Some(Aa::Temporal) => Smooth { count: 1, filter, temporal: frames.or(Some(temporal::FRAMES)) },
-        None => Smooth { count: 1, filter, temporal: frames },
+        Some(Aa::Mean(count)) => Smooth { count, ..one },
+        Some(Aa::Temporal) => Smooth { temporal: frames.or(Some(temporal::FRAMES)), ..one },
+        Some(Aa::Edges) => Smooth { edges: true, ..one },
+        None => Smooth { temporal: frames, ..one },
     })
 }

@@ -4,6 +4,7 @@
 //! have the same weight. The first place is the middle of the pixel. Layers that are no light (normals, depths) come from there alone.
 //!
 //! For sequences there is temporal anti-aliasing as well: each frame is one picture, and the average goes over time ([`lucerna::passes::temporal`]).
+//! Where one picture takes long, its light can serve further places inside the pixels ([`lucerna::passes::edges`]).
 
 use std::str::FromStr;
 
@@ -11,7 +12,7 @@ use clap::ValueEnum;
 use glam::Vec2;
 use lucerna::{
     image::{Layer, Layers},
-    passes::temporal,
+    passes::{edges, temporal},
 };
 use serde::{Deserialize, Serialize};
 
@@ -40,6 +41,8 @@ pub enum Aa {
     Mean(u32),
     /// The average over the frames.
     Temporal,
+    /// One picture, whose light serves further places inside the pixels.
+    Edges,
 }
 
 impl FromStr for Aa {
@@ -49,8 +52,11 @@ impl FromStr for Aa {
         if text == "temporal" {
             return Ok(Self::Temporal);
         }
+        if text == "edges" {
+            return Ok(Self::Edges);
+        }
         let count = text.parse().ok().filter(|count| (1..=MOST).contains(count));
-        count.map(Self::Mean).ok_or_else(|| format!("expected a number in 1..={MOST}, or temporal"))
+        count.map(Self::Mean).ok_or_else(|| format!("expected a number in 1..={MOST}, edges or temporal"))
     }
 }
 
@@ -58,10 +64,11 @@ impl FromStr for Aa {
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct SmoothArgs {
     /// Anti-aliasing: the picture is the mean of N pictures, whose pixels look at different places around their middles; normals and depths are those
-    /// of the middles. 1: none. temporal: each frame is one picture, averaged with the frames before it, where they show the same
-    /// surfaces; layers are those of the frame [default: 8 for stills; 1 for sequences, with --paper, and on CPU drivers where one picture
-    /// takes seconds]
-    #[arg(long, value_name = "N|temporal", help_heading = "Picture")]
+    /// of the middles. 1: none. edges: one picture, and eight places inside each pixel take its light where they show the same
+    /// surface; edges of shadows and in mirrors stay as they are. temporal: each frame is one picture, averaged with the frames before it,
+    /// where they show the same surfaces; layers are those of the frame [default: 8 for stills, or edges on CPU drivers where one picture
+    /// takes seconds; 1 for sequences and with --paper]
+    #[arg(long, value_name = "N|edges|temporal", help_heading = "Picture")]
     pub aa: Option<Aa>,
 
     /// Weight of the places around the middle of a pixel, for --aa
@@ -83,30 +90,52 @@ pub struct Smooth {
     /// Most frames of the average over time; `None`: each frame stands for itself.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub temporal: Option<u32>,
+    /// The light of one picture serves further places inside the pixels.
+    #[serde(default, skip_serializing_if = "std::ops::Not::not")]
+    pub edges: bool,
 }
 
 impl Default for Smooth {
     /// None.
     fn default() -> Self {
-        Self { count: 1, filter: Filter::default(), temporal: None }
+        Self { count: 1, filter: Filter::default(), temporal: None, edges: false }
     }
 }
 
 impl Smooth {
     pub fn is_none(&self) -> bool {
-        self.count == 1 && self.temporal.is_none()
+        self.count == 1 && self.temporal.is_none() && !self.edges
     }
 
     /// The options that ask for this.
     pub fn args(&self) -> SmoothArgs {
-        let aa = if self.temporal.is_some() { Aa::Temporal } else { Aa::Mean(self.count) };
+        let aa = match (self.temporal, self.edges) {
+            (Some(_), _) => Aa::Temporal,
+            (None, true) => Aa::Edges,
+            (None, false) => Aa::Mean(self.count),
+        };
         SmoothArgs { aa: Some(aa), filter: self.filter, aa_frames: self.temporal }
     }
 
     /// Where the pictures look, from the middle of each pixel to the right and down, pixels. The first one looks at the middle.
     pub fn places(&self) -> Vec<Vec2> {
         let lattice = lattice(self.count.clamp(1, MOST));
-        lattice.into_iter().map(|[x, y]| Vec2::new(self.filter.place(x) as f32, self.filter.place(y) as f32)).collect()
+        lattice.into_iter().map(|at| self.of_filter(at)).collect()
+    }
+
+    fn of_filter(&self, [x, y]: [f64; 2]) -> Vec2 {
+        Vec2::new(self.filter.place(x) as f32, self.filter.place(y) as f32)
+    }
+
+    /// The places inside the pixels that the light of one picture serves, for the engine. The first one is the middle.
+    pub fn edges(&self) -> Option<[Vec2; edges::PLACES]> {
+        let lattice = lattice(edges::PLACES as u32);
+        self.edges.then(|| std::array::from_fn(|i| self.of_filter(lattice[i])))
+    }
+
+    /// Only the picture is smooth: the other layers are those of the frame or of the middles.
+    pub fn is_of_the_total(&self) -> bool {
+        self.temporal.is_some() || self.edges
     }
 
     /// Where the only picture of a frame looks.
@@ -213,7 +242,7 @@ impl Mean {
     }
 }
 
-/// The names of the layers that temporal anti-aliasing leaves as they are: all but the picture, before and after tone mapping.
+/// The names of the layers that anti-aliasing of the total leaves as they are: all but the picture, before and after tone mapping.
 pub fn of_the_frame(layers: &Layers) -> Vec<String> {
     let names = layers.layers.iter().map(|layer| layer.name.clone());
     names.filter(|name| !["", "light"].contains(&name.as_str())).collect()
@@ -229,7 +258,7 @@ mod tests {
     use super::*;
 
     fn places(count: u32, filter: Filter) -> Vec<Vec2> {
-        Smooth { count, filter, temporal: None }.places()
+        Smooth { count, filter, ..Smooth::default() }.places()
     }
 
     #[test]
@@ -260,21 +289,35 @@ mod tests {
 
     #[test]
     fn values_are_numbers_or_temporal() {
-        assert_eq!(("1".parse(), "temporal".parse()), (Ok(Aa::Mean(1)), Ok(Aa::Temporal)));
+        assert_eq!(
+            ["1", "temporal", "edges"].map(str::parse),
+            [Aa::Mean(1), Aa::Temporal, Aa::Edges].map(Ok::<_, String>)
+        );
         for bad in ["0", "1025", "-1", "", "Temporal", "taa"] {
-            assert!(bad.parse::<Aa>().unwrap_err().contains("1..=1024, or temporal"), "{bad}");
+            assert!(bad.parse::<Aa>().unwrap_err().contains("1..=1024, edges or temporal"), "{bad}");
         }
         for smooth in [
             Smooth::default(),
             Smooth { count: 5, ..Smooth::default() },
             Smooth { temporal: Some(3), ..Smooth::default() },
+            Smooth { edges: true, ..Smooth::default() },
         ] {
             let SmoothArgs { aa, aa_frames: frames, .. } = smooth.args();
             let again = match aa {
                 Some(Aa::Mean(count)) => Smooth { count, temporal: frames, ..Smooth::default() },
+                Some(Aa::Edges) => Smooth { edges: true, ..Smooth::default() },
                 _ => Smooth { temporal: frames, ..Smooth::default() },
             };
             assert_eq!(again, smooth);
+        }
+    }
+
+    #[test]
+    fn places_that_one_picture_serves_are_those_of_a_mean() {
+        for filter in [Filter::Box, Filter::Tent, Filter::BlackmanHarris] {
+            let smooth = Smooth { filter, edges: true, ..Smooth::default() };
+            assert_eq!(smooth.edges().unwrap().to_vec(), places(8, filter));
+            assert_eq!(Smooth { edges: false, ..smooth }.edges(), None);
         }
     }
 

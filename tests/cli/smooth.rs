@@ -68,6 +68,46 @@ fn a_still_is_the_mean_of_eight_and_its_edges_are_smooth() {
     assert_eq!(report["same_file"], true, "{report}");
 }
 
+/// Where one picture takes a CPU driver seconds, its light serves the places inside the pixels.
+#[test]
+fn a_still_that_takes_long_is_one_picture_with_smooth_edges() {
+    if !device() {
+        return;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let [usual, one, edges, many] = [None, Some("1"), Some("edges"), Some("16")].map(|aa| {
+        let name = path(&folder, &format!("{}.exr", aa.unwrap_or("usual")));
+        let aa: Vec<&str> = aa.map_or(vec![], |aa| vec!["--aa", aa]);
+        // Indirect light has noise, which has nothing to do with edges.
+        let of = ["render", "igi", "--builtin", "cornell", "--size", "96x80", "-q", "--mode", "direct", "-o", &name];
+        lucerna([&of[..], &aa].concat()).expect(0, &[]);
+        name
+    });
+    let devices = lucerna(["devices", "--json"]).expect(0, &[]).json();
+    if devices.as_array().unwrap().iter().all(|device| device["kind"] == "CPU") {
+        assert!(fs::read(&usual).unwrap() == fs::read(&edges).unwrap());
+    }
+    let flip = |test: &str| {
+        let report = lucerna(["compare", "-q", "-m", "flip", "--json", &many, test]).expect(0, &[]).json();
+        report["tests"][0]["measures"]["flip"]["value"].as_f64().unwrap_or_else(|| panic!("{report}"))
+    };
+    let [of_one, of_edges] = [flip(&one), flip(&edges)];
+    println!("FLIP: {of_edges} with smooth edges, {of_one} without");
+    assert!(of_edges < 0.6 * of_one, "{of_edges} {of_one}");
+    let [plain, smooth, best] = [&one, &edges, &many].map(|name| read(name));
+    assert!((sum(&smooth) / sum(&best) - 1.0).abs() < 1e-2);
+    // Only the picture changes.
+    for layer in plain.layers.iter().filter(|layer| !layer.name.is_empty()) {
+        assert!(layer.data == smooth.layer(&layer.name).unwrap().data, "{}", layer.name);
+    }
+    let about = config(&edges);
+    assert_eq!(about["aa"], serde_json::json!({ "count": 1, "filter": "box", "edges": true }));
+    let exact = about["exact"].to_string();
+    assert!(["normal", "depth", "direct", "indirect"].iter().all(|name| exact.contains(name)), "{exact}");
+    let report = lucerna(["rerun", "--json", "-q", &edges]).expect(0, &[]).json();
+    assert_eq!(report["same_file"], true, "{report}");
+}
+
 #[test]
 fn filters_keep_the_light_and_tone_mapping_comes_after_the_mean() {
     if !device() {
@@ -121,8 +161,10 @@ fn papers_and_images_of_the_graph_have_single_pictures() {
         (&["--aa-filter", "gauss"], &["box", "tent", "blackman-harris"]),
         (&["--aa", "2", "--mode", "occlusion"], &["--aa", "occlusion"]),
         (&["--aa", "temporal", "--mode", "occlusion"], &["--aa", "occlusion"]),
-        (&["--aa", "Temporal"], &["--aa", "1..=1024, or temporal"]),
+        (&["--aa", "edges", "--mode", "occlusion"], &["--aa", "occlusion"]),
+        (&["--aa", "Temporal"], &["--aa", "1..=1024, edges or temporal"]),
         (&["--aa", "2", "--aa-frames", "4"], &["--aa-frames", "temporal"]),
+        (&["--aa", "edges", "--aa-frames", "4"], &["--aa-frames", "temporal"]),
         (&["--aa", "temporal", "--aa-frames", "0"], &["--aa-frames", "1..=256"]),
     ] {
         room(wrong).expect(2, parts);

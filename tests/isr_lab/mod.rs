@@ -111,6 +111,7 @@ pub fn gbuffer_seen(graph: &mut Graph, view: &View, buffers: &Buffers) -> GBuffe
         emission,
         hardware: coarse.depth,
         view: graph.uniform(&view.uniform()),
+        settings: Default::default(),
     }
 }
 

@@ -23,6 +23,8 @@ mod isr_reference;
 mod isr_senders;
 #[path = "../isr_senders_scene.rs"]
 mod isr_senders_scene;
+#[path = "../smooth_edges.rs"]
+mod smooth_edges;
 #[path = "../temporal.rs"]
 mod temporal;
 #[path = "../temporal_twin.rs"]

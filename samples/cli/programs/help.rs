@@ -25,7 +25,7 @@ const SHORT: &[(&str, &str)] = &[
     ("light", "Add a point light: metres, W/sr"),
     ("exposure", "Multiply colours by 2^EV"),
     ("frames", "Render frames A to B-1"),
-    ("aa", "Smooth edges: the mean of N pictures; temporal: of frames"),
+    ("aa", "Smooth edges: the mean of N pictures; edges: one picture"),
     ("preset", "Settings preset: fast, balanced or best"),
     ("mode", "What the picture shows (--help lists all)"),
     ("bake", "File of `bake`"),

@@ -341,6 +341,7 @@ impl Viewer {
                 moved: self.moved.clone(),
                 shows: side.shows.clone(),
                 pictures: side.pictures,
+                edges: side.has_edges(),
                 samples: side.samples,
                 moving,
                 exposure,

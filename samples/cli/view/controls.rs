@@ -286,6 +286,9 @@ fn technique(viewer: &mut Viewer, number: usize, ui: &mut Ui) {
             ui.label("Samples per pixel");
             ui.add(egui::DragValue::new(&mut side.pictures).speed(0.1).range(1..=1024))
                 .on_hover_text("Anti-aliasing at rest: --aa");
+            ui.add_enabled(side.pictures == 1, egui::Checkbox::new(&mut side.edges, "Edges"))
+                .on_hover_text("Smooth edges of a single picture: --aa edges")
+                .on_disabled_hover_text("The mean of several pictures has smooth edges");
         }
         if side.about.paper.is_some()
             && ui.button("Paper").on_hover_text("The settings of the paper (--paper)").clicked()

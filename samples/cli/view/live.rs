@@ -19,7 +19,7 @@ use crate::{
     effects::{self, Effects},
     exposure,
     last_stage::{self, LastStage, Staged},
-    smooth::{Filter, Mean, Smooth},
+    smooth::{Mean, Smooth},
     stage::Stage,
     view::wanted::{Shows, Wanted},
 };
@@ -169,12 +169,14 @@ impl<T: Technique> Living<T> {
         // As `render` numbers them: noise of other random numbers is averaged, too.
         graph.seed = number.wrapping_mul(0x9e37_79b9);
         let scene = (&wanted.stage.scene, take.pose);
+        let edges = wanted.edges && self.is_light(wanted);
         let shot = Shot {
             seconds: wanted.seconds,
             frames: 1,
             mode: mode::<T::Mode>(&wanted.mode),
             layers: take.layers,
             temporal: None,
+            edges: Smooth { edges, ..Smooth::default() }.edges(),
         };
         let mut picture = self.ready.frame(&mut graph, scene, &take.view.shifted(place), shot, settings)?;
         if let Some((_, effects)) = &self.effects {
@@ -211,7 +213,7 @@ impl<T: Technique> Live for Living<T> {
     fn mean(&mut self, wanted: &Wanted, take: &Take<'_>, told: &mut dyn FnMut(f64)) -> Result<Made> {
         let settings = self.prepare(wanted, take)?;
         self.runner.forget_history();
-        let places = Smooth { count: wanted.pictures, filter: Filter::default(), temporal: None }.places();
+        let places = Smooth { count: wanted.pictures, ..Smooth::default() }.places();
         let (mut mean, all) = (Mean::default(), places.len() as f64);
         let mut first = None;
         for (number, place) in places.into_iter().enumerate().rev() {

@@ -348,6 +348,7 @@ mod tests {
             moved: BTreeMap::new(),
             shows: Shows::Picture,
             pictures: 1,
+            edges: false,
             samples: 1 << 20,
             moving: false,
             exposure: Some(0.0),

@@ -27,6 +27,8 @@ pub struct Side {
     pub defaults: Arc<Value>,
     pub bake: Option<PathBuf>,
     pub pictures: u32,
+    /// A single picture has smooth edges.
+    pub edges: bool,
     pub samples: u64,
     pub shows: Shows,
     /// Shown in the place of a technique.
@@ -63,6 +65,7 @@ impl Side {
             about,
             bake: None,
             pictures: 1,
+            edges: true,
             samples: SAMPLES,
             shows: Shows::Picture,
             file: None,
@@ -87,6 +90,11 @@ impl Side {
         self.pictures = if about.cheap { smooth::STILL } else { 1 };
         self.shows = Shows::Picture;
         self.about = about;
+    }
+
+    /// The light of one picture serves further places inside the pixels, as `--aa edges` asks `render`.
+    pub fn has_edges(&self) -> bool {
+        self.edges && self.pictures == 1 && self.is_light()
     }
 
     /// The settings of the paper, or the defaults.

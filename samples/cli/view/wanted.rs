@@ -75,6 +75,8 @@ pub struct Wanted {
     pub shows: Shows,
     /// Pictures of the mean of a still.
     pub pictures: u32,
+    /// The light of one picture serves further places inside the pixels.
+    pub edges: bool,
     /// Paths a pixel of the path tracer.
     pub samples: u64,
     /// The camera, a lamp or the time moves, so that a quick picture is better than a fine one.
@@ -96,6 +98,7 @@ impl Wanted {
             && self.moved == other.moved
             && self.shows == other.shows
             && self.pictures == other.pictures
+            && self.edges == other.edges
             && self.samples == other.samples
             && self.moving == other.moving
     }
