@@ -1,5 +1,6 @@
 //! The interface of all techniques: each is found by its name, renders, and names the settings that it is prepared by.
 
+use glam::Vec2;
 use lucerna::{
     Result,
     gpu::{Gpu, testing::with_gpu},
@@ -57,6 +58,17 @@ impl Visitor for Render<'_> {
                 let averaged = Shot { temporal: Some(Default::default()), ..shot };
                 let picture = ready.frame(&mut Graph::new(T::NAME), (&scene, &pose), &view, averaged, &settings);
                 assert_eq!(picture.is_ok(), mode.is_radiance(), "{} {}", T::NAME, mode.name());
+                // And its light can serve more places of a pixel.
+                let places = std::array::from_fn(|i| Vec2::splat(0.06 * i as f32));
+                let smooth = Shot { edges: Some(places), ..shot };
+                let mut graph = Graph::new(T::NAME);
+                let picture = ready.frame(&mut graph, (&scene, &pose), &view, smooth, &settings);
+                assert_eq!(picture.is_ok(), mode.is_radiance(), "{} {}", T::NAME, mode.name());
+                if let Ok(picture) = picture {
+                    let readback = picture.read(&mut graph, true, true);
+                    let smooth = readback.layers(&Runner::new(self.gpu).run(&graph)?);
+                    assert!(smooth.main().unwrap().data.iter().all(|x| x.is_finite()), "{} {}", T::NAME, mode.name());
+                }
             }
             if mode.is_radiance() {
                 // The queen stands in the middle of the picture, and the environment lights it.

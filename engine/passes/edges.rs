@@ -2,8 +2,9 @@
 //! pixels around that show its surface (subpixel reconstruction, M. Chajdas, M. McGuire, D. Luebke, *Subpixel Reconstruction Antialiasing for
 //! Deferred Shading*, I3D 2011). The light is computed once, so the cost is that of the G-buffers.
 //!
-//! Edges between surfaces become smooth. Edges of shadows and in mirrors stay as they are, because the G-buffer does not have them, and a wire
-//! that no middle of a pixel meets stays away. Where the pixels of a surface show it alone, the picture is the same as before.
+//! Edges between surfaces, and in their textures, become smooth. Edges of shadows, in mirrors, behind glass and in the picture of the environment
+//! stay as they are, because the G-buffer does not have them, and a wire that no middle of a pixel meets stays away. Inside a surface
+//! without texture and normal map the picture is the same as before.
 //! `passes/edges.comp` states how this differs from the paper.
 
 use super::gbuffer::{self, GBuffer};

@@ -279,7 +279,9 @@ impl<T: Technique> Ready<T> {
         };
         if let Some(places) = &shot.edges {
             let gbuffer = radiance.ok_or_else(|| without("edges"))?;
-            picture.total = edges::smooth(graph, &handles, (&gbuffer, &view), picture.total, places)?;
+            let drawn = picture.drawn.take();
+            let drawn = drawn.as_ref().unwrap_or(&handles);
+            picture.total = edges::smooth(graph, drawn, (&gbuffer, &view), picture.total, places)?;
         }
         if let Some(settings) = shot.temporal {
             let gbuffer = radiance.ok_or_else(|| without("temporal"))?;

@@ -6,6 +6,7 @@ use crate::{
     Result,
     graph::{Buffer, Graph, Image},
     passes::gbuffer::GBuffer,
+    resident::Handles,
     scene::{Note, View},
 };
 
@@ -43,6 +44,8 @@ pub struct Picture {
     pub(super) numbers: Vec<(&'static str, Number)>,
     /// The surfaces that the picture shows. [`super::Ready::frame`] takes it and adds its layers.
     pub gbuffer: Option<GBuffer>,
+    /// The scene with which the G-buffer was drawn, if the technique has changed it. [`super::Ready::frame`] takes it.
+    pub(super) drawn: Option<Handles>,
     /// R32F: the matte of the chosen objects ([`super::Ready::choose`]), which is also the layer `chosen`.
     pub matte: Option<Image>,
     /// The view of the picture. [`super::Ready::frame`] sets it.
@@ -78,7 +81,19 @@ impl Picture {
     /// A picture without layers: the red, green and blue channels of an image are radiance.
     pub fn new(total: Image) -> Self {
         let (layers, sums, remarks, numbers, notes) = Default::default();
-        Self { total, grey: false, layers, sums, remarks, numbers, gbuffer: None, matte: None, view: None, notes }
+        Self {
+            total,
+            grey: false,
+            layers,
+            sums,
+            remarks,
+            numbers,
+            gbuffer: None,
+            drawn: None,
+            matte: None,
+            view: None,
+            notes,
+        }
     }
 
     /// A picture without layers: the first channel of an image, as grey.
@@ -136,6 +151,12 @@ impl Picture {
     #[must_use]
     pub fn showing(self, gbuffer: GBuffer) -> Self {
         Self { gbuffer: Some(gbuffer), ..self }
+    }
+
+    /// Says that the G-buffer shows this scene and not that of the frame: other materials, or fewer surfaces.
+    #[must_use]
+    pub fn drawn_with(self, handles: Handles) -> Self {
+        Self { drawn: Some(handles), ..self }
     }
 
     /// Sets the notes.

@@ -42,7 +42,7 @@ pub struct Run<'a> {
     fit_exposure: bool,
     /// Anti-aliasing; that of the device after [`Self::smooth_on`].
     pub smooth: Smooth,
-    /// Whether a CPU driver smooths the edges of a still unasked, as GPUs do; `None`: no device does.
+    /// Whether a CPU driver takes the mean of several pictures unasked, as GPUs do, or smooths the edges of one; `None`: no device does either.
     unasked: Option<bool>,
     pub stage: Stage,
     pub outputs: Outputs,
@@ -422,7 +422,7 @@ fn smoothing(args: &RenderArgs, technique: &Label) -> Result<Smooth> {
     let none = matches!(aa, None | Some(Aa::Mean(1))) && frames.is_none();
     if !none && !technique.radiance {
         let mode = technique.mode.unwrap_or("this mode");
-        let what = format!("the picture of {mode} of {} is not light, so it has no mean", technique.name);
+        let what = format!("the picture of {mode} of {} is not light, so --aa cannot smooth it", technique.name);
         return wrong(what, "Leave --aa out, or render all light");
     }
     let single =
@@ -431,8 +431,7 @@ fn smoothing(args: &RenderArgs, technique: &Label) -> Result<Smooth> {
         return wrong(format!("the argument '--aa <N>' cannot be used with '{option}'"), "Leave one of them out");
     }
     if frames.is_some() && matches!(aa, Some(Aa::Mean(_) | Aa::Edges)) {
-        let what =
-            "'--aa-frames <N>' is for --aa temporal, and --aa asks for the mean of pictures, or for edges".to_owned();
+        let what = "'--aa-frames <N>' works only with --aa temporal".to_owned();
         return wrong(what, "Leave --aa-frames out, or give --aa temporal");
     }
     let one = Smooth { filter, ..Smooth::default() };

@@ -2,8 +2,8 @@
 // around that show the same surface (subpixel reconstruction, Chajdas, McGuire and Luebke 2011). This is one place of all pixels.
 //
 // Two differences from the paper. Where the pixel itself shows the surface of a place, the place has the light of its pixel: the inside of a
-// surface stays as it is, with its noise and its texture. And colour, reflectance and emission tell surfaces apart as well as plane and normal,
-// because a picture or a sheet of paper lies in the plane of its wall or table.
+// smooth surface stays as it is, with its noise. And colour, reflectance and emission tell surfaces apart as well as plane and normal,
+// because a picture or a sheet of paper lies in the plane of its wall or table. Edges in textures and in normal maps become smooth thereby.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -44,8 +44,6 @@ const vec2 COLOURED = vec2(0.05, 0.2);
 const vec2 EMITTING = vec2(0.05, 0.2);
 // How fast a pixel loses weight with the square of its distance from the place, pixels.
 const float NEAR = 2.0;
-// Less weight than this in all pixels around is no light: the place is a thing that no pixel shows.
-const float LEAST = 1e-3;
 
 struct Surface {
     bool sky;
@@ -98,17 +96,24 @@ void main() {
     vec3 result = own;
     if (mine < 1.0) {
         vec3 around = vec3(0.0);
-        float weight = 0.0;
+        float weight = 0.0, best = 0.0;
         for (int i = 0; i < 9; ++i) {
             ivec2 offset = ivec2(i % 3, i / 3) - 1;
             ivec2 texel = pixel + offset;
             if (offset == ivec2(0) || any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) continue;
             vec2 way = vec2(offset) - place;
-            float w = exp(-NEAR * dot(way, way)) * alike(here, of_pixel(texel), width);
+            float same = alike(here, of_pixel(texel), width);
+            float w = exp(-NEAR * dot(way, way)) * same;
+            // Light that is no number must not pass from one surface to another.
+            if (w <= 0.0) continue;
+            best = max(best, same);
             around += w * texelFetch(light, texel, 0).rgb;
             weight += w;
         }
-        if (weight > LEAST) result = mix(around / weight, own, mine);
+        // Pixels that are hardly alike have a small share, and without any the place is a thing that no pixel shows.
+        float other = (1.0 - mine) * best;
+        if (other >= 1.0) result = around / weight;
+        else if (other > 0.0) result = mix(own, around / weight, other);
     }
     imageStore(after, pixel, vec4(sum + share * result, 1.0));
 }

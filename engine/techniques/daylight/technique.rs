@@ -464,6 +464,6 @@ impl Technique for Daylight {
                 .number("stream_wait_ms", 1e3 * frames.waited.as_secs_f64()),
             false => picture,
         };
-        Ok(picture.showing(gbuffer).noting(notes))
+        Ok(picture.showing(gbuffer).drawn_with(handles).noting(notes))
     }
 }

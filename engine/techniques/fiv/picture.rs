@@ -56,6 +56,8 @@ pub struct Outputs {
 #[derive(Clone, Debug)]
 pub struct Picture {
     pub gbuffer: GBuffer,
+    /// The scene that the G-buffer shows, if occluders are hidden.
+    pub receivers: Option<Handles>,
     pub outputs: Outputs,
     /// Approximations of this frame.
     pub notes: Vec<Note>,
@@ -144,7 +146,7 @@ impl Fiv {
         } else {
             Vec::new()
         };
-        Ok(Picture { gbuffer, outputs, notes })
+        Ok(Picture { gbuffer, receivers, outputs, notes })
     }
 
     /// The scene without the instances that are occluders, for passes that draw.

@@ -127,6 +127,10 @@ impl Technique for Fiv {
         let made = self.picture(graph, moment.scene, moment.pose, moment.handles, &moment.view, &settings)?;
         let shown = Picture::new(made.outputs.total).color("irradiance", made.outputs.irradiance);
         let notes: Vec<Note> = [moment.notes, self.notes(), &made.notes].concat();
+        let shown = match made.receivers {
+            Some(receivers) => shown.drawn_with(receivers),
+            None => shown,
+        };
         Ok(shown.showing(made.gbuffer).noting(notes))
     }
 }

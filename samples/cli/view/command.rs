@@ -90,9 +90,10 @@ pub fn words(common: &Common<'_>, side: &Side) -> Option<Vec<String>> {
     }
     if truth {
         say(&["--spp", &side.samples.to_string()]);
+    } else if side.has_edges() {
+        say(&["--aa", "edges"]);
     } else if light {
-        let aa = if side.has_edges() { "edges".to_owned() } else { side.pictures.to_string() };
-        say(&["--aa", &aa]);
+        say(&["--aa", &side.pictures.to_string()]);
     }
     if let Some(bake) = &side.bake {
         say(&[if side.technique == "fiv" { "--vectors" } else { "--bake" }, &bake.display().to_string()]);

@@ -94,7 +94,11 @@ impl Side {
 
     /// The light of one picture serves further places inside the pixels, as `--aa edges` asks `render`.
     pub fn has_edges(&self) -> bool {
-        self.edges && self.pictures == 1 && self.is_light()
+        let mode = self.about.modes.iter().find(|mode| mode.name == self.mode);
+        let is_light = self.technique != TRUTH && mode.is_none_or(|mode| mode.is_light);
+        // The two pictures of `prt` for two eyes are side by side, and have no view in common.
+        let eyes = self.settings.pointer("/prt/eyes").and_then(Value::as_f64).is_some_and(|apart| apart > 0.0);
+        self.edges && self.pictures == 1 && is_light && !eyes
     }
 
     /// The settings of the paper, or the defaults.

@@ -73,7 +73,8 @@ fn quick(wanted: &Wanted, by: u32) -> Wanted {
         let fewer = texels / u64::from(by.min(MOST_SHADOW));
         *size = fewer.max(LEAST_SHADOW.min(texels)).into();
     }
-    Wanted { settings: Arc::new(settings), edges: false, ..wanted.clone() }
+    let edges = wanted.edges && matches!(wanted.shows, Shows::Image(_));
+    Wanted { settings: Arc::new(settings), edges, ..wanted.clone() }
 }
 
 /// Light that may be painted again in another way.

@@ -1,6 +1,6 @@
 //! The window's surface.
 //!
-//! Under X11 it has a connection of its own to the X server. A driver that presents reads the connection of its surface in a thread: it waits
+//! Under X11 on Linux it has a connection of its own to the X server. A driver that presents reads the connection of its surface in a thread: it waits
 //! there for messages about its pictures, and puts the other messages aside in memory. If that connection were the event loop's, which
 //! sleeps until the connection's socket can be read, a key or a click that this thread had put aside would wait until the next event.
 
