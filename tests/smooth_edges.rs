@@ -3,9 +3,13 @@
 use crate::tracer_lab::{Stage, flat_view, view};
 use glam::{DVec3, Vec2, Vec3, vec3};
 use lucerna::{
-    gpu::{Gpu, testing::with_gpu},
+    gpu::{Gpu, ImageDesc, OwnedImage, Region, testing::with_gpu},
     graph::{Graph, Runner},
-    passes::{edges::PLACES, temporal},
+    passes::{
+        edges::{self, PLACES},
+        gbuffer, temporal,
+    },
+    resident::Resident,
     scene::{Material, Pose, Scene, View},
     technique::{Ready, Shot},
     techniques::isr::{AreaLights, Isr, Mode, PictureSettings, Settings},
@@ -162,6 +166,90 @@ fn colours_tell_surfaces_apart() {
         let [before, after] = [&one, &smooth].map(|found| error(found, &mean));
         println!("error relative to the mean of {PLACES} pictures: {before} of one picture, {after} with smooth edges");
         assert!(after < 0.2 * before, "{after} {before}");
+    });
+}
+
+/// `light` with smooth edges, one texel for each pixel of `view`.
+fn smoothed(gpu: &Gpu, scene: &Scene, view: &View, light: &[[f32; 4]]) -> Vec<f32> {
+    let desc = ImageDesc::new(ash::vk::Format::R32G32B32A32_SFLOAT, view.extent[0], view.extent[1]);
+    let region = Region { mip: 0, layer: 0, bytes: bytemuck::cast_slice(light) };
+    let image = OwnedImage::with_contents(gpu, "light", desc, &[region]).unwrap();
+    let mut resident = Resident::new(gpu, scene).unwrap();
+    let mut graph = Graph::new("smoothed");
+    let handles = resident.frame_in(&mut graph, scene, &Pose::rest(scene));
+    let view = view.fit_far(&handles.bounds());
+    let g = gbuffer::draw(&mut graph, &handles, &view, &gbuffer::Settings::default());
+    let light = graph.import_image(&image);
+    let weights = edges::weights(&mut graph, &handles, (&g, &view), &places()).unwrap();
+    let token = weights.smooth(&mut graph, light).unwrap();
+    let token = graph.read_image(token);
+    let frame = Runner::new(gpu).run(&graph).unwrap_or_else(|error| panic!("{error}"));
+    frame.image(token).to_f32().iter().map(|texel| texel[0]).collect()
+}
+
+/// A picture with light that is infinite or no number, on a card before a wall.
+#[test]
+fn light_that_is_no_number_stays_on_its_surface() {
+    let mut stage = Stage::new();
+    let [wall, card] = [vec3(0.5, 0.6, 0.7), vec3(3.0, 1.0, 0.2)].map(|radiance| stage.emitter(radiance));
+    stage.quad(wall, vec3(-9.0, -9.0, -1.0), vec3(18.0, 0.0, 0.0), vec3(0.0, 18.0, 0.0));
+    stage.quad(card, vec3(-0.3, 0.2, 0.1), vec3(0.9, 0.37, 0.0), vec3(-0.37, 0.9, 0.0));
+    with_gpu(|gpu| {
+        let shown = Studio::new(gpu, &stage.scene).shoot(&eye(), None);
+        let on_card: Vec<bool> = shown.iter().map(|light| light.x > 1.0).collect();
+        let of_card = |value: f32, other: f32| -> Vec<[f32; 4]> {
+            on_card.iter().map(|card| [if *card { value } else { other }; 4]).collect()
+        };
+        let share = smoothed(gpu, &stage.scene, &eye(), &of_card(1.0, 0.0));
+        for bad in [f32::NAN, f32::INFINITY] {
+            let found = smoothed(gpu, &stage.scene, &eye(), &of_card(bad, 0.25));
+            for (i, (found, share)) in found.iter().zip(&share).enumerate() {
+                assert_eq!(found.is_finite(), *share == 0.0, "pixel {i}: {found}, share {share}");
+                assert!(!found.is_finite() || (found - 0.25).abs() < 1e-6, "pixel {i}: {found}");
+            }
+        }
+        // Pixels beside the card without a share of its light.
+        let width = SIZE[0] as usize;
+        let beside = |i: usize| on_card[i - 1] || on_card[i + 1] || on_card[i - width] || on_card[i + width];
+        let inner = width + 1..on_card.len() - width - 1;
+        let alone = inner.filter(|i| !on_card[*i] && beside(*i) && share[*i] == 0.0).count();
+        let shared = share.iter().filter(|share| **share > 0.0 && **share < 1.0).count();
+        assert!(alone > 20 && shared > 50, "{alone} {shared}");
+    });
+}
+
+#[test]
+fn layers_add_up_to_the_picture() {
+    let mut stage = Stage::new();
+    let of = |colour| Material { ior: 1.0, ..Material::diffuse("matt", colour) };
+    let [white, red] = [vec3(0.7, 0.7, 0.7), vec3(0.8, 0.2, 0.1)].map(|colour| stage.material(of(colour)));
+    stage.quad(white, vec3(-4.0, 0.0, -2.0), vec3(0.0, 0.0, 6.0), vec3(8.0, 0.0, 0.0));
+    stage.quad(white, vec3(-9.0, -9.0, -2.0), vec3(18.0, 0.0, 0.0), vec3(0.0, 18.0, 0.0));
+    stage.cuboid(red, vec3(-0.9, 0.0, -0.7), vec3(-0.3, 0.9, -0.1), false);
+    stage.sphere(white, vec3(0.6, 0.5, 0.0), 0.5, 24, false);
+    stage.point(vec3(0.9, 2.5, 2.0), Vec3::splat(30.0));
+    with_gpu(|gpu| {
+        let mut studio = Studio::new(gpu, &stage.scene);
+        let pose = Pose::rest(&stage.scene);
+        let [plain, smooth] = [None, Some(places())].map(|edges| {
+            let mut graph = Graph::new("layers");
+            let shot = Shot { edges, ..Shot::default() };
+            let picture = studio.ready.frame(&mut graph, (&stage.scene, &pose), &eye(), shot, &settings()).unwrap();
+            let reading = picture.read(&mut graph, true, false);
+            let frame = studio.runner.run(&graph).unwrap_or_else(|error| panic!("{error}"));
+            reading.layers(&frame)
+        });
+        let data = |name: &str| smooth.layer(name).unwrap_or_else(|| panic!("no layer {name}")).data.clone();
+        let (total, direct, indirect) = (data(""), data("direct"), data("indirect"));
+        assert!(indirect.iter().any(|value| *value > 0.0));
+        // The technique rounds each of the three to 16 bits.
+        for (total, (direct, indirect)) in total.iter().zip(direct.iter().zip(&indirect)) {
+            assert!((total - direct - indirect).abs() <= 1.5e-3 * total + 1e-5, "{total} {direct} {indirect}");
+        }
+        for layer in &plain.layers {
+            let same = layer.data == data(&layer.name);
+            assert_eq!(same, layer.channels != ["R", "G", "B"], "{}", layer.name);
+        }
     });
 }
 

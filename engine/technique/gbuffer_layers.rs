@@ -4,14 +4,14 @@ use glam::{Vec2, Vec3};
 
 use crate::{passes::gbuffer::GBuffer, scene::View};
 
-use super::{Decode, Picture, picture::Layer};
+use super::{Decode, picture::Layer};
 
 /// Depth of the background, metres; the value that Blender writes.
 const BACKGROUND: f32 = 1e10;
 
 /// Adds `albedo`, `normal` (world space) and `depth` (distance along the line of sight, metres).
-pub(super) fn add(picture: &mut Picture, gbuffer: &GBuffer, view: &View) {
-    picture.layers.extend([
+pub(super) fn add(layers: &mut Vec<Layer>, gbuffer: &GBuffer, view: &View) {
+    layers.extend([
         Layer { name: "albedo", channels: &["R", "G", "B"], image: gbuffer.albedo, decode: Decode::Plain },
         Layer { name: "normal", channels: &["X", "Y", "Z"], image: gbuffer.normal, decode: Decode::Normal },
         Layer { name: "depth", channels: &["Z"], image: gbuffer.depth, decode: Decode::Depth { far: view.far } },

@@ -129,8 +129,8 @@ pub struct Shot<M> {
     /// Temporal anti-aliasing: the total is the average over the frames. The caller shifts each frame's view ([`temporal::place`]), and all
     /// frames have one `Runner`. The other layers are those of the frame.
     pub temporal: Option<temporal::Settings>,
-    /// Smooth edges of the total by further places inside each pixel, which have no light of their own ([`edges::smooth`]). The other layers
-    /// are those of the middles.
+    /// Smooth edges of the total and of all layers of colours by further places inside each pixel, which have no light of their own
+    /// ([`edges`]). The other layers are those of the middles.
     pub edges: Option<[Vec2; edges::PLACES]>,
 }
 
@@ -271,6 +271,9 @@ impl<T: Technique> Ready<T> {
         let view = view.fit_far(&handles.bounds());
         let moment = Moment { scene, pose, handles: &handles, view, shot, notes: self.resident.notes() };
         let mut picture = self.technique.frame(graph, &moment, settings)?;
+        if let Some(gbuffer) = &picture.gbuffer {
+            gbuffer_layers::add(&mut picture.layers, gbuffer, &view);
+        }
         let mut shown = view;
         let radiance = picture.gbuffer.filter(|_| shot.mode.is_radiance());
         let without = |at| {
@@ -281,7 +284,12 @@ impl<T: Technique> Ready<T> {
             let gbuffer = radiance.ok_or_else(|| without("edges"))?;
             let drawn = picture.drawn.take();
             let drawn = drawn.as_ref().unwrap_or(&handles);
-            picture.total = edges::smooth(graph, drawn, (&gbuffer, &view), picture.total, places)?;
+            let weights = edges::weights(graph, drawn, (&gbuffer, &view), places)?;
+            picture.total = weights.smooth(graph, picture.total)?;
+            // Without a reader the layers must cost nothing.
+            for layer in picture.layers.iter_mut().filter(|layer| shot.layers && layer.is_color()) {
+                layer.image = weights.smooth(graph, layer.image)?;
+            }
         }
         if let Some(settings) = shot.temporal {
             let gbuffer = radiance.ok_or_else(|| without("temporal"))?;
@@ -304,9 +312,7 @@ impl<T: Technique> Ready<T> {
             picture = picture.values("chosen", &["Y"], matte);
             picture.matte = Some(matte);
         }
-        if let Some(gbuffer) = picture.gbuffer.take() {
-            gbuffer_layers::add(&mut picture, &gbuffer, &view);
-        }
+        picture.gbuffer = None;
         picture.view = Some(shown);
         Ok(picture)
     }

@@ -63,6 +63,13 @@ pub(super) struct Layer {
     pub decode: Decode,
 }
 
+impl Layer {
+    /// Colours have means; directions, distances and numbers have none.
+    pub fn is_color(&self) -> bool {
+        self.channels == ["R", "G", "B"]
+    }
+}
+
 /// A number for the whole frame: the sum of a channel over all pixels.
 #[derive(Clone, Debug)]
 pub(super) struct Sum {

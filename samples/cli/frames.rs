@@ -24,7 +24,7 @@ use crate::{
     run::Run,
     screen::Screen,
     signals::Interrupt,
-    smooth::{Mean, of_the_frame},
+    smooth::Mean,
 };
 
 /// Prepares a technique. `None` if the user has requested a stop meanwhile.
@@ -215,9 +215,7 @@ impl<T: Technique> Work<'_, T> {
         let Rendered { layers, frame, view } = rendered;
         let report = frame.report.clone();
         drop(frame);
-        if run.smooth.is_of_the_total() {
-            run.name_exact(of_the_frame(&layers));
-        }
+        run.name_exact(run.smooth.exact(&layers));
         self.write(run, of, (layers, view), begun, progress, |time| vec![(time, report)])
     }
 

@@ -65,8 +65,7 @@ impl FromStr for Aa {
 pub struct SmoothArgs {
     /// Anti-aliasing: the picture is the mean of N pictures, whose pixels look at different places around their middles; normals and depths are those
     /// of the middles. 1: none. edges: one picture, and eight places inside each pixel take its light where they show the same
-    /// surface; edges of shadows and in mirrors stay as they are, and all layers are those of the middles. temporal: each frame is one
-    /// picture, averaged with the frames before it, where they show the same surfaces; layers are those of the frame [default: 8 for stills, or edges on CPU drivers where one picture
+    /// surface; edges of shadows and in mirrors stay as they are. temporal: each frame is one picture, averaged with the frames before it, where they show the same surfaces; layers are those of the frame [default: 8 for stills, or edges on CPU drivers where one picture
     /// takes seconds; 1 for sequences and with --paper]
     #[arg(long, value_name = "N|edges|temporal", help_heading = "Picture")]
     pub aa: Option<Aa>,
@@ -133,9 +132,15 @@ impl Smooth {
         self.edges.then(|| std::array::from_fn(|i| self.of_filter(lattice[i])))
     }
 
-    /// Only the picture is smooth: the other layers are those of the frame or of the middles.
-    pub fn is_of_the_total(&self) -> bool {
-        self.temporal.is_some() || self.edges
+    /// The layers of one picture that anti-aliasing leaves as they are.
+    pub fn exact(&self, layers: &Layers) -> Vec<String> {
+        let exact = |layer: &&Layer| match (self.temporal, self.edges) {
+            // All but the picture, before and after tone mapping.
+            (Some(_), _) => !["", "light"].contains(&layer.name.as_str()),
+            (None, true) => !is_light(layer),
+            (None, false) => false,
+        };
+        layers.layers.iter().filter(exact).map(|layer| layer.name.clone()).collect()
     }
 
     /// Where the only picture of a frame looks.
@@ -240,12 +245,6 @@ impl Mean {
         let exact = mean.layers.iter().filter(|layer| !is_light(layer)).map(|layer| layer.name.clone()).collect();
         Some((mean, exact))
     }
-}
-
-/// The names of the layers that anti-aliasing of the total leaves as they are: all but the picture, before and after tone mapping.
-pub fn of_the_frame(layers: &Layers) -> Vec<String> {
-    let names = layers.layers.iter().map(|layer| layer.name.clone());
-    names.filter(|name| !["", "light"].contains(&name.as_str())).collect()
 }
 
 /// Colours have means; directions, distances and numbers have none.

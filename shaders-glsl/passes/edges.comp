@@ -1,5 +1,7 @@
 // Smooth edges of one picture: the surfaces of further places inside each pixel, without light of their own, take the light of the pixels
-// around that show the same surface (subpixel reconstruction, Chajdas, McGuire and Luebke 2011). This is one place of all pixels.
+// around that show the same surface (subpixel reconstruction, Chajdas, McGuire and Luebke 2011). This pass adds the weights of one place of all
+// pixels: the shares of the eight neighbours of each pixel in the light of the place. The rest is the share of the pixel itself.
+// `edges_gather.comp` applies the weights.
 //
 // Two differences from the paper. Where the pixel itself shows the surface of a place, the place has the light of its pixel: the inside of a
 // smooth surface stays as it is, with its noise. And colour, reflectance and emission tell surfaces apart as well as plane and normal,
@@ -10,6 +12,7 @@
 #include "lib/view.glsl"
 #include "lib/screen.glsl"
 #include "lib/gbuffer.glsl"
+#include "passes/edges.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -25,14 +28,13 @@ layout(binding = 8) uniform sampler2D place_depth;
 layout(binding = 9) uniform sampler2D place_albedo;
 layout(binding = 10) uniform sampler2D place_specular;
 layout(binding = 11) uniform sampler2D place_emission;
-layout(binding = 12) uniform sampler2D light;  // radiance of the middles
-layout(binding = 13) uniform sampler2D before; // sum over the places before this one
-layout(binding = 14, rgba32f) uniform writeonly image2D after;
+// Weights of the four neighbours before the pixel, and of the four after it: sums over the places.
+layout(binding = 12, rgba32f) uniform image2D weights_before;
+layout(binding = 13, rgba32f) uniform image2D weights_after;
 
 layout(push_constant, scalar) uniform Push {
     vec2 place;  // from the middle of the pixel to the right and down, pixels
     float share; // weight of a place
-    uint first;  // 1: the sum before is the light itself, of the middles
 };
 
 // Cosines between normals from which surfaces differ, and from which they are alike.
@@ -82,38 +84,32 @@ Surface of_pixel(ivec2 texel) {
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
-    ivec2 size = imageSize(after);
+    ivec2 size = textureSize(depth, 0);
     if (any(greaterThanEqual(pixel, size))) return;
-
-    vec3 sum = texelFetch(before, pixel, 0).rgb;
-    if (first != 0u) sum *= share;
-    vec3 own = texelFetch(light, pixel, 0).rgb;
 
     Surface here = of_place(pixel);
     float z = texelFetch(place_depth, pixel, 0).r;
     float width = view.pixel_angle * (view.orthographic != 0u ? 1.0 : z * view.far);
     float mine = alike(here, of_pixel(pixel), width);
-    vec3 result = own;
-    if (mine < 1.0) {
-        vec3 around = vec3(0.0);
-        float weight = 0.0, best = 0.0;
-        for (int i = 0; i < 9; ++i) {
-            ivec2 offset = ivec2(i % 3, i / 3) - 1;
-            ivec2 texel = pixel + offset;
-            if (offset == ivec2(0) || any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) continue;
-            vec2 way = vec2(offset) - place;
-            float same = alike(here, of_pixel(texel), width);
-            float w = exp(-NEAR * dot(way, way)) * same;
-            // Light that is no number must not pass from one surface to another.
-            if (w <= 0.0) continue;
-            best = max(best, same);
-            around += w * texelFetch(light, texel, 0).rgb;
-            weight += w;
-        }
-        // Pixels that are hardly alike have a small share, and without any the place is a thing that no pixel shows.
-        float other = (1.0 - mine) * best;
-        if (other >= 1.0) result = around / weight;
-        else if (other > 0.0) result = mix(own, around / weight, other);
+    if (mine >= 1.0) return;
+    float around[EDGE_NEIGHBOURS];
+    float sum = 0.0, best = 0.0;
+    for (int i = 0; i < EDGE_NEIGHBOURS; ++i) {
+        around[i] = 0.0;
+        ivec2 offset = edge_neighbour(i);
+        ivec2 texel = pixel + offset;
+        if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, size))) continue;
+        vec2 way = vec2(offset) - place;
+        float same = alike(here, of_pixel(texel), width);
+        around[i] = exp(-NEAR * dot(way, way)) * same;
+        best = max(best, same);
+        sum += around[i];
     }
-    imageStore(after, pixel, vec4(sum + share * result, 1.0));
+    if (sum <= 0.0) return; // a thing that no pixel shows
+    // Pixels that are hardly alike have a small share.
+    float scale = share * (1.0 - mine) * best / sum;
+    vec4 before = vec4(around[0], around[1], around[2], around[3]);
+    vec4 after = vec4(around[4], around[5], around[6], around[7]);
+    imageStore(weights_before, pixel, imageLoad(weights_before, pixel) + scale * before);
+    imageStore(weights_after, pixel, imageLoad(weights_after, pixel) + scale * after);
 }
