@@ -167,6 +167,15 @@ fn the_bits_do_not_depend_on_tiles_or_on_breaks() {
             });
             assert!(whole == cut, "tiles of {slots} slots");
         }
+        // Several parts of one submission.
+        for paths in [64, 448, 1000] {
+            let cut = traced(gpu, &scene, &view, |t| {
+                t.set_together(paths);
+                t.set_tile(Some(1 << 20));
+                t.step(5).unwrap();
+            });
+            assert!(whole == cut, "{paths} paths together");
+        }
         let steps = traced(gpu, &scene, &view, |t| [1, 3, 1].iter().for_each(|&n| t.step(n).unwrap()));
         assert!(whole == steps, "in steps");
         // Stopped in the middle of a sample, saved, and gone on with in another tracer.

@@ -20,13 +20,13 @@ use crate::{
     scene::{Material, Pose, Scene},
     shaders::{
         consts,
-        reference::{path as shader, path_trace},
+        reference::{path as shader, path_end, path_trace},
         types,
     },
 };
 
-/// Maximum of paths that are traced together. The buffer of path states has the same size.
-const MOST_SLOTS: u64 = 1 << 18;
+/// Maximum of paths that are traced together, which may belong to several samples. The buffer of path states has the same size.
+pub(super) const MOST_SLOTS: u64 = 1 << 18;
 /// Maximum of passes per submission.
 const MOST_PASSES: u64 = 512;
 /// Kinds of rays.
@@ -43,6 +43,8 @@ pub(super) struct Kernel {
     cells: [u32; 2],
     lights: Option<Lights>,
     paths: Option<Paths>,
+    /// Maximum of paths that are traced together.
+    pub together: u64,
 }
 
 /// The states of paths between passes.
@@ -79,9 +81,9 @@ pub(super) struct Cut {
 }
 
 impl Cut {
-    /// Maximum of slots per submission. It also limits small pictures, whose samples are many passes.
+    /// Maximum of slots per submission.
     pub fn most(&self) -> u64 {
-        let passes = u64::from(self.surfaces) * (1 + u64::from(self.turns.0));
+        let passes = u64::from(self.surfaces) * (1 + u64::from(self.turns.0)) + 1;
         self.capacity * (MOST_PASSES / passes).max(1)
     }
 }
@@ -101,6 +103,7 @@ impl Kernel {
             cells: importance.cells,
             lights: None,
             paths: None,
+            together: MOST_SLOTS,
         })
     }
 
@@ -135,14 +138,14 @@ impl Kernel {
         Ok(())
     }
 
-    /// Divides the work on a picture, after [`Self::light`], and makes the buffer of path states.
+    /// Divides work on `slots` slots of a picture, after [`Self::light`], and makes the buffer of path states.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.
-    pub fn cut(&mut self, scene: &Scene, job: &Job) -> Result<Cut> {
+    pub fn cut(&mut self, scene: &Scene, job: &Job, slots: u64) -> Result<Cut> {
         let turns = self.turns(scene, &job.settings)?;
         let surfaces = longest(scene, &job.settings);
-        let capacity = MOST_SLOTS.min(job.slots());
+        let capacity = slots.min(self.together).max(1);
         let states = capacity * size_of::<types::PathState>() as u64;
         let counts = place_of_count(surfaces + 1, 0);
         if self.paths.as_ref().is_none_or(|p| p.states.size() < states || p.counts[0].size() < counts) {
@@ -193,7 +196,7 @@ impl Kernel {
     ) -> Result<Buffer> {
         let rays = self.rays.frame(graph, handles);
         let (Some(lights), Some(paths)) = (&self.lights, &self.paths) else { return Err(super::not_started()) };
-        let (slots, offset) = (job.slots(), job.first_slot());
+        let slots = job.slots();
         let settings = graph.uniform(&self.path_settings(scene, job, (lights, paths), cut));
         let view = graph.uniform(&job.view.uniform());
         let sums = graph.import_buffer(&job.sums);
@@ -247,13 +250,12 @@ impl Kernel {
         let (turns, ways) = cut.turns;
         let mut at = tile.start;
         while at < tile.end {
-            let (sample, first) = (at / slots, at % slots);
-            let count = (slots - first).min(tile.end - at).min(cut.capacity) as u32;
+            let (sample_index, first) = ((at / slots) as u32, (at % slots) as u32);
+            let count = (tile.end - at).min(cut.capacity) as u32;
             let begin = graph.buffer_from("tracer.begin", &first_counts(cut.surfaces, count));
             for counts in counts {
                 graph.copy_buffer(begin, counts.range(0..begin.size));
             }
-            let (first, sample_index) = ((offset + first) as u32, sample as u32);
             let rays = |graph: &mut Graph, turn: u32, way: u32| {
                 let counts = counts[turn as usize % 2];
                 let spec = path_trace::Spec { to_lights: u32::from(way != consts::ON) };
@@ -266,11 +268,14 @@ impl Kernel {
                 let [traced, counts] = [number, number + 1].map(|turn| counts[turn as usize % 2]);
                 let push = shader::Push { first, sample_index, surface: number };
                 let args = shader::Args { traced, counts, push, ..surface };
-                graph.compute_indirect(args, traced, place_of_count(number, consts::ON)).writing(sums);
+                graph.compute_indirect(args, traced, place_of_count(number, consts::ON));
                 for way in ways.iter().take(turns as usize).filter(|way| **way != consts::ON) {
                     rays(graph, number + 1, *way);
                 }
             }
+            let push = path_end::Push { first, sample_index, count };
+            let pixels = slots.min(count.into()) as u32;
+            graph.compute(path_end::Args { settings, paths: states, push }, [pixels, 1, 1]).writing(sums);
             at += u64::from(count);
         }
         Ok(sums)
@@ -317,6 +322,8 @@ impl Kernel {
             texture_slots: std::array::from_fn(|i| textures.get(i).copied().unwrap_or(0)),
             turns,
             turn_ways,
+            slots: job.slots() as u32,
+            first_slot: job.first_slot() as u32,
             capacity: cut.capacity as u32,
             sum_pixels: job.pixels() as u32,
             sums_at: job.sums.address_words(),
@@ -352,7 +359,7 @@ fn textures(scene: &Scene, settings: &Settings) -> Vec<u32> {
 /// Maximum of surfaces along a path.
 fn longest(scene: &Scene, settings: &Settings) -> u32 {
     let sharp = !settings.diffuse_only && may_be_sharp(scene);
-    settings.bounces + 3 + if sharp { settings.specular_bounces } else { 0 }
+    settings.bounces + 2 + if sharp { settings.specular_bounces } else { 0 }
 }
 
 /// Place of a [`types::PathCount`], bytes.
@@ -362,7 +369,7 @@ fn place_of_count(turn: u32, way: u32) -> u64 {
 
 /// The counts of paths before the first pass: all are at the camera.
 fn first_counts(surfaces: u32, paths: u32) -> Vec<types::PathCount> {
-    let none = types::PathCount { groups: 0, one: 1, another: 1, paths: 0, waiting: 0 };
+    let none = types::PathCount { groups: 0, one: 1, another: 1, paths: 0 };
     let mut counts = vec![none; WAYS * (surfaces as usize + 1)];
     if let Some(all) = counts.get_mut(consts::ON as usize) {
         *all = types::PathCount { groups: paths.div_ceil(consts::PATH_GROUP), paths, ..none };

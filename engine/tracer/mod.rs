@@ -65,7 +65,7 @@ use crate::{
     shaders::types,
 };
 use job::{GRANULE, Job};
-use kernel::Kernel;
+use kernel::{Kernel, MOST_SLOTS};
 
 /// A path tracer for one scene on one device.
 #[derive(Debug)]
@@ -145,6 +145,11 @@ impl<'s> Tracer<'s> {
         self.fixed_tile = slots;
     }
 
+    /// Limits the number of paths that are traced together, whose states are in memory: 1 to 2¹⁸, the default. The picture does not depend on it.
+    pub fn set_together(&mut self, paths: u64) {
+        self.kernel.together = paths.clamp(1, MOST_SLOTS);
+    }
+
     /// Renders a picture with `samples` paths per pixel. [`Sums::layers`] describes its layers.
     ///
     /// # Errors
@@ -188,7 +193,7 @@ impl<'s> Tracer<'s> {
             return Err(Error::usage(format!("{samples} samples a pixel; at most {} are numbered", u32::MAX)));
         }
         let total = samples.saturating_mul(slots).max(done);
-        let cut = self.kernel.cut(self.scene, job)?;
+        let cut = self.kernel.cut(self.scene, job, total - done)?;
         let most = cut.most().max(u64::from(GRANULE));
         // The passes of a tile are many, and each wakes the threads of a CPU driver, which has no watchdog.
         let aim = if self.kernel.gpu().caps().kind == DeviceKind::Cpu { 300 } else { 30 };

@@ -133,9 +133,9 @@ impl Technique for Reference {
         if samples > u64::from(u32::MAX) {
             return Err(Error::usage(format!("{samples} samples a pixel; at most {} are numbered", u32::MAX)));
         }
-        let cut = self.kernel.cut(moment.scene, job)?;
-        let sums_at = job.sums.address_words();
         let tile = job.done..samples * job.slots();
+        let cut = self.kernel.cut(moment.scene, job, tile.end - tile.start)?;
+        let sums_at = job.sums.address_words();
         let sums = self.kernel.declare(graph, (moment.scene, moment.handles), job, tile.clone(), cut)?;
         job.done = tile.end;
         let extent = moment.view.extent;

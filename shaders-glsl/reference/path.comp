@@ -1,6 +1,6 @@
-// Path tracing of a tile of pixels, with one sample per pixel: what happens at the surfaces that rays have hit. reference/path_trace.comp
-// traces the rays. Each pass has a list of the paths that it concerns, so that invocations side by side do the same, and none waits for a
-// longer path. Radiance is summed separately by the number of scatterings along the path: none, one, more.
+// Path tracing of some samples of a tile of pixels: what happens at the surfaces that rays have hit. reference/path_trace.comp traces the rays,
+// and reference/path_end.comp adds the light of the paths to the sums. Each pass has a list of the paths that it concerns, so that invocations
+// side by side do the same, and none waits for a longer path. Radiance is kept apart by the number of scatterings along the path: none, one, more.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -44,73 +44,60 @@ layout(binding = 19, scalar) readonly buffer Traced { PathCount traced[]; };
 layout(binding = 21, scalar) buffer Counts { PathCount counts[]; };
 
 layout(push_constant, scalar) uniform Push {
-    uint first;        // slot of the tile's first pixel, in blocks of 8 × 8
+    uint first;        // reference/path_slots.glsl
     uint sample_index;
     uint surface;      // number of the surface along the paths; 0: new paths
 };
 
-#include "reference/path_sums.glsl"
 #include "reference/path_at.glsl"
+#include "reference/path_slots.glsl"
 #include "reference/path_camera.glsl"
 #include "reference/path_step.glsl"
 
-// Appends paths to the list of their rays of one kind from this surface, or of those that wait for light. One invocation of a subgroup counts
-// for all.
-void append(bool wanted, uint way, bool waits, uint slot) {
+// Appends paths to the list of their rays of one kind from this surface. One invocation of a subgroup counts for all.
+void append(bool wanted, uint way, uint slot) {
     uvec4 those = subgroupBallot(wanted);
     uint more = subgroupBallotBitCount(those);
-    uint first = 0u;
+    uint before = 0u;
     if (more > 0u && subgroupElect()) {
         uint at = path_count(way, surface + 1u);
-        if (waits) first = atomicAdd(counts[at].waiting, more);
-        else first = atomicAdd(counts[at].paths, more);
-        uint groups = (first + more + PATH_GROUP - 1u) / PATH_GROUP - (first + PATH_GROUP - 1u) / PATH_GROUP;
+        before = atomicAdd(counts[at].paths, more);
+        uint groups = (before + more + PATH_GROUP - 1u) / PATH_GROUP - (before + PATH_GROUP - 1u) / PATH_GROUP;
         if (groups > 0u) atomicAdd(counts[at].groups, groups);
     }
-    first = subgroupBroadcastFirst(first);
-    uint number = first + subgroupBallotExclusiveBitCount(those);
-    if (waits) number = settings.capacity - 1u - number;
+    before = subgroupBroadcastFirst(before);
+    uint number = before + subgroupBallotExclusiveBitCount(those);
     if (wanted) LIST_AT(path_list(way, surface + 1u) * settings.capacity + number) = slot;
 }
 
 void main() {
-    uint count = path_count(ON, surface);
-    uint traced_groups = (traced[count].paths + PATH_GROUP - 1u) / PATH_GROUP;
-    bool waited = gl_WorkGroupID.x >= traced_groups;
-    uint number = gl_GlobalInvocationID.x - (waited ? traced_groups * PATH_GROUP : 0u);
-    bool there = number < (waited ? traced[count].waiting : traced[count].paths);
-    if (waited) number = settings.capacity - 1u - number;
-    uint slot = number;
-    if (there && surface > 0u) slot = LIST_AT(path_list(ON, surface) * settings.capacity + number);
-    uvec2 pixel = pixel_of(first + slot);
+    uint slot = gl_GlobalInvocationID.x;
+    bool there = slot < traced[path_count(ON, surface)].paths;
+    if (there && surface > 0u) slot = LIST_AT(path_list(ON, surface) * settings.capacity + slot);
+    uvec2 pixel = pixel_of(slot);
     there = there && all(lessThan(pixel, settings.extent));
     bool alive = false;
     uint waiting = 0u;
     if (there) {
         Path path;
         path.steps = unpacked_steps(PATH_AT(slot).steps);
-        // If not, the light that waited has arrived.
-        if (path.steps.alive) {
-            path.origin = PATH_AT(slot).origin;
-            path.density = PATH_AT(slot).density;
-            path.direction = PATH_AT(slot).direction;
-            path.throughput = PATH_AT(slot).throughput;
-            waiting = path_surface(pixel, slot, HIT_AT(slot), path);
-            alive = path.steps.alive;
-            PATH_AT(slot).steps = packed_steps(path.steps);
-            if (alive) {
-                PATH_AT(slot).origin = path.origin;
-                PATH_AT(slot).density = path.density;
-                PATH_AT(slot).direction = path.direction;
-                PATH_AT(slot).throughput = path.throughput;
-            }
+        path.origin = PATH_AT(slot).origin;
+        path.density = PATH_AT(slot).density;
+        path.direction = PATH_AT(slot).direction;
+        path.throughput = PATH_AT(slot).throughput;
+        waiting = path_surface(pixel, sample_of(slot), slot, HIT_AT(slot), path);
+        alive = path.steps.alive;
+        PATH_AT(slot).steps = packed_steps(path.steps);
+        if (alive) {
+            PATH_AT(slot).origin = path.origin;
+            PATH_AT(slot).density = path.density;
+            PATH_AT(slot).direction = path.direction;
+            PATH_AT(slot).throughput = path.throughput;
         }
-        if (!alive && waiting == 0u) add_light(pixel, PATH_AT(slot).emission, PATH_AT(slot).direct, PATH_AT(slot).indirect);
     }
-    append(alive, ON, false, slot);
-    append(!alive && waiting != 0u, ON, true, slot);
+    append(alive, ON, slot);
     for (uint turn = 1u; turn < settings.turns; ++turn) {
         uint way = settings.turn_ways[turn];
-        append((waiting >> way & 1u) != 0u, way, false, slot);
+        append((waiting >> way & 1u) != 0u, way, slot);
     }
 }

@@ -1,5 +1,5 @@
 // The path tracer's settings, the state of a path between passes, the lists of paths for each pass, and random numbers.
-// Before including: lib/random.glsl, lib/sampling.glsl.
+// Before including: lib/random.glsl.
 #ifndef LIB_PATH
 #define LIB_PATH
 #include "lib/environment_map.glsl"
@@ -38,6 +38,8 @@ struct PathSettings {
     uint texture_slots[8];     // these kinds: TEXTURE_ of the surface, or TEXTURE_OF_LAMP plus that of a light's surface
     uint turns;                // rays per surface
     uint turn_ways[4];         // kind of each of these rays; the first is ON
+    uint slots;                // of one sample
+    uint first_slot;           // of the pixels that have sums
     uint capacity;             // maximum of paths
     uint sum_pixels;           // pixels that have sums
     uvec2 sums_at;             // addresses (lib/scene_at.glsl)
@@ -69,6 +71,10 @@ struct PathState {
     vec3 emission;     // radiance without scattering
     vec3 direct;       // radiance after one scattering
     vec3 indirect;     // radiance after more scatterings
+    vec3 albedo;       // of the first surface; this and the next three are undefined without one
+    float depth;       // along the view axis, metres
+    vec3 normal;       // shading normal
+    vec3 position;
     vec3 light_origin;
     WaitingLight lamp; // three members, because compilers keep an array in memory and not in registers
     WaitingLight sun;
@@ -94,11 +100,10 @@ Steps unpacked_steps(uint steps) {
 
 // Number of paths with a ray of one kind between two surfaces. The first three members are the groups of an indirect dispatch.
 struct PathCount {
-    uint groups;       // of PATH_GROUP paths: first those of `paths`, then those of `waiting`
+    uint groups;       // of PATH_GROUP paths
     uint one;
     uint another;
-    uint paths;        // their slots are at the beginning of the list
-    uint waiting;      // paths without a ray that wait for light; their slots are at the end of the list, the last one first
+    uint paths;
 };
 const uint PATH_GROUP = 64u; // export
 // Lists of `capacity` slots: one for each kind of rays to lights; rays to the next surface have two, for even and odd numbers.

@@ -1,7 +1,8 @@
 // The states of paths, their hits and their lists by address. Before including: reference/path.glsl, lib/ray.glsl and `settings`.
 #ifndef LIB_PATH_AT
 #define LIB_PATH_AT
-#include "lib/scene_at.glsl"
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
 
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer PathsAt { PathState of[]; };
 layout(buffer_reference, scalar, buffer_reference_align = 4) buffer HitsAt { Hit of[]; };

@@ -1,23 +1,15 @@
-// The beginning of paths: slots, pixels, camera rays. Before including: `view`, `settings` and `sample_index`.
-
-// Pixel of a slot. Slots are ordered by blocks of 8 × 8 pixels, so that the rays of a workgroup are close to each other.
-uvec2 pixel_of(uint slot) {
-    uint block = slot / 64u;
-    uint inside = slot % 64u;
-    uvec2 corner = 8u * uvec2(block % settings.blocks, block / settings.blocks);
-    return corner + uvec2(inside % 8u, inside / 8u);
-}
+// The beginning of paths: random numbers and camera rays. Before including: `view` and `settings`.
 
 // The dimension of the random numbers that decide about blended surfaces along the ray to a surface. `vertex`: number of surfaces before it.
 uint path_dimension(uint vertex) {
     return 1u + 5u * vertex;
 }
 
-// A ray, of which `limit` is in lengths of the direction.
-Ray camera_ray(uvec2 pixel) {
+// The ray of sample `number`, of which `limit` is in lengths of the direction.
+Ray camera_ray(uvec2 pixel, uint number) {
     vec2 inside = vec2(0.5);
     if ((settings.flags & PATH_JITTER) != 0u) {
-        inside = unit_floats(point_words(point_place(pixel, sample_index, settings.plan, settings.seed), 0u, settings.seed));
+        inside = unit_floats(point_words(point_place(pixel, number, settings.plan, settings.seed), 0u, settings.seed));
     }
     vec2 uv = (vec2(pixel) + inside) / vec2(settings.extent);
     // From the near plane to the far plane, like the rasteriser.

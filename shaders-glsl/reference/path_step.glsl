@@ -41,10 +41,10 @@ float sample_triangle_light(float chosen, vec3 from, SurfacePoint point, bool do
 }
 
 // Adds the light of the surface, samples lights and the next direction. Rays to lights wait in the state. Returns their kinds as bits.
-uint path_surface(uvec2 pixel, uint slot, Hit hit, inout Path path) {
+uint path_surface(uvec2 pixel, uint number, uint slot, Hit hit, inout Path path) {
     uint dimension = path_dimension(path.steps.vertex);
-    uvec4 salts = random_words(pixel, sample_index, dimension, settings.seed);
-    PointPlace points_at = point_place(pixel, sample_index, settings.plan, settings.seed);
+    uvec4 salts = random_words(pixel, number, dimension, settings.seed);
+    PointPlace points_at = point_place(pixel, number, settings.plan, settings.seed);
     vec3 toward = normalize(path.direction);
     bool missed = hit.instance == NONE;
     bool scatters = !missed && path.steps.scattered <= settings.bounces;
@@ -150,15 +150,15 @@ uint path_surface(uvec2 pixel, uint slot, Hit hit, inout Path path) {
     // A directional light, and the point or spot light from the light tree.
     for (uint turn_of = 1u; turn_of < settings.turns; ++turn_of) {
         uint i = settings.turn_ways[turn_of];
-        uint number = to.index;
+        uint chosen_light = to.index;
         float probability = chosen;
         if (!scatters || i == TO_SKY) continue;
         if (i == TO_SUN) {
-            number = LIGHT_TARGET(pick_sun(settings.suns, salts.z, unit_float(salts.w), probability)).index;
+            chosen_light = LIGHT_TARGET(pick_sun(settings.suns, salts.z, unit_float(salts.w), probability)).index;
         } else if (to.instance != TARGET_PUNCTUAL) {
             continue;
         }
-        Light one = light(number);
+        Light one = light(chosen_light);
         vec3 to_light;
         vec3 arrives = light_irradiance(one, above, to_light) / probability;
         if (i == TO_SUN) {
@@ -189,8 +189,10 @@ uint path_surface(uvec2 pixel, uint slot, Hit hit, inout Path path) {
     float ior = MATERIAL_AT(material).ior;
     vec3 albedo = unlit ? vec3(0.0) : (1.0 - metallic) * base.rgb;
     if (path.steps.vertex == 0u) {
-        float depth = -(view.view_from_world * vec4(point.position, 1.0)).z;
-        add_surface(pixel, albedo, normal, point.position, depth);
+        PATH_AT(slot).albedo = albedo;
+        PATH_AT(slot).depth = -(view.view_from_world * vec4(point.position, 1.0)).z;
+        PATH_AT(slot).normal = normal;
+        PATH_AT(slot).position = point.position;
     }
 
     if ((settings.flags & PATH_SEES_EMISSION) != 0u) {

@@ -24,13 +24,14 @@ layout(binding = 18, scalar) readonly buffer Lists { uint lists[]; };
 layout(binding = 19, scalar) readonly buffer Counts { PathCount counts[]; };
 
 layout(push_constant, scalar) uniform Push {
-    uint first;        // slot of the tile's first pixel, in blocks of 8 × 8
+    uint first;        // reference/path_slots.glsl
     uint sample_index;
     uint turn;         // 0 for camera rays, n + 1 for rays from surface n
     uint way;
 };
 
 #include "reference/path_at.glsl"
+#include "reference/path_slots.glsl"
 #include "reference/path_camera.glsl"
 
 // The light that waits in a path.
@@ -52,10 +53,9 @@ void begin_path(uint slot, Ray ray) {
 }
 
 void main() {
-    uint number = gl_GlobalInvocationID.x;
-    if (number >= counts[path_count(way, turn)].paths) return;
-    uint slot = number;
-    if (turn > 0u) slot = LIST_AT(path_list(way, turn) * settings.capacity + number);
+    uint slot = gl_GlobalInvocationID.x;
+    if (slot >= counts[path_count(way, turn)].paths) return;
+    if (turn > 0u) slot = LIST_AT(path_list(way, turn) * settings.capacity + slot);
     if (TO_LIGHTS != 0u) {
         WaitingLight light = waiting_light(slot);
         // The ray ends a little before a lamp, so that the lamp does not occlude itself.
@@ -65,17 +65,18 @@ void main() {
         else PATH_AT(slot).indirect += light.radiance;
         return;
     }
-    uvec2 pixel = pixel_of(first + slot);
+    uvec2 pixel = pixel_of(slot);
+    uint number = sample_of(slot);
     Steps steps = Steps(true, 0u, 0u, 0u);
     Ray ray;
     if (turn == 0u) {
-        ray = camera_ray(pixel);
+        ray = camera_ray(pixel, number);
         begin_path(slot, ray);
     } else {
         steps = unpacked_steps(PATH_AT(slot).steps);
         ray = Ray(PATH_AT(slot).origin, 0.0, PATH_AT(slot).direction, 1e30);
     }
     uint mask = steps.vertex == 0u ? TRACE_CAMERA : steps.scattered > 0u ? TRACE_SHADOW : 0u;
-    uint salt = random_words(pixel, sample_index, path_dimension(steps.vertex), settings.seed).x;
+    uint salt = random_words(pixel, number, path_dimension(steps.vertex), settings.seed).x;
     HIT_AT(slot) = trace(ray, mask, salt, false);
 }
