@@ -109,7 +109,7 @@ fn the_engines_constant_is_no_part_of_an_interface_and_its_number_is_taken() {
     for (line, part) in [
         (
             "layout(constant_id=31) const uint MINE",
-            "MINE: constant_id 31 is the engine's (TRACE_ORDERED); use another number",
+            "MINE: constant_id 31; name and number 31 belong to TRACE_ORDERED of the engine",
         ),
         ("layout(constant_id=7) const uint TRACE_ORDERED", "TRACE_ORDERED: constant_id 7"),
     ] {

@@ -414,10 +414,11 @@ pub fn reflect(words: &[u32]) -> Result<Interface, String> {
     for &id in &w.spec {
         let Some(spec_id) = w.decoration(id, SPEC_ID) else { continue };
         let (engines, name) = ENGINE_SPEC;
-        if spec_id == engines && w.name(id) != name {
-            return Err(format!("{}: constant_id {engines} is the engine's ({name}); use another number", w.name(id)));
-        } else if w.name(id) == name && spec_id != engines {
-            return Err(format!("{name}: constant_id {spec_id}; this constant is the engine's and has {engines}"));
+        if (spec_id == engines) != (w.name(id) == name) {
+            let found = w.name(id);
+            return Err(format!(
+                "{found}: constant_id {spec_id}; name and number {engines} belong to {name} of the engine"
+            ));
         } else if spec_id == engines {
             continue;
         }

@@ -285,10 +285,12 @@ impl<T: Technique> Ready<T> {
             let drawn = picture.drawn.take();
             let drawn = drawn.as_ref().unwrap_or(&handles);
             let weights = edges::weights(graph, drawn, (&gbuffer, &view), places)?;
-            picture.total = weights.smooth(graph, picture.total)?;
+            let middles = picture.total;
+            picture.total = weights.smooth(graph, middles)?;
             // Without a reader the layers must cost nothing.
             for layer in picture.layers.iter_mut().filter(|layer| shot.layers && layer.is_color()) {
-                layer.image = weights.smooth(graph, layer.image)?;
+                let same = layer.image == middles;
+                layer.image = if same { picture.total } else { weights.smooth(graph, layer.image)? };
             }
         }
         if let Some(settings) = shot.temporal {

@@ -64,7 +64,7 @@ pub(super) struct Layer {
 }
 
 impl Layer {
-    /// Colours have means; directions, distances and numbers have none.
+    /// Colours have means; directions, distances and numbers have none. Programs tell the layers that stay exact by the same rule.
     pub fn is_color(&self) -> bool {
         self.channels == ["R", "G", "B"]
     }

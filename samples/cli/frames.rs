@@ -215,7 +215,8 @@ impl<T: Technique> Work<'_, T> {
         let Rendered { layers, frame, view } = rendered;
         let report = frame.report.clone();
         drop(frame);
-        run.name_exact(run.smooth.exact(&layers));
+        // An image of the graph is what it is.
+        run.name_exact(if self.args.view.is_none() { run.smooth.exact(&layers) } else { Vec::new() });
         self.write(run, of, (layers, view), begun, progress, |time| vec![(time, report)])
     }
 

@@ -65,7 +65,8 @@ impl FromStr for Aa {
 pub struct SmoothArgs {
     /// Anti-aliasing: the picture is the mean of N pictures, whose pixels look at different places around their middles; normals and depths are those
     /// of the middles. 1: none. edges: one picture, and eight places inside each pixel take its light where they show the same
-    /// surface; edges of shadows and in mirrors stay as they are. temporal: each frame is one picture, averaged with the frames before it, where they show the same surfaces; layers are those of the frame [default: 8 for stills, or edges on CPU drivers where one picture
+    /// surface; edges of shadows and in mirrors stay as they are. temporal: each frame is one picture, averaged with the frames before it,
+    /// where they show the same surfaces; layers are those of the frame [default: 8 for stills, or edges on CPU drivers where one picture
     /// takes seconds; 1 for sequences and with --paper]
     #[arg(long, value_name = "N|edges|temporal", help_heading = "Picture")]
     pub aa: Option<Aa>,
@@ -247,7 +248,8 @@ impl Mean {
     }
 }
 
-/// Colours have means; directions, distances and numbers have none.
+/// Colours have means; directions, distances and numbers have none. The engine has the same rule for the layers whose edges it smooths
+/// ([`lucerna::technique::Shot::edges`]).
 fn is_light(layer: &Layer) -> bool {
     layer.channels == ["R", "G", "B"]
 }

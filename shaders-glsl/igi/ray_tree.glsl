@@ -28,7 +28,7 @@ layout(binding = 70, scalar) buffer TreeNodes { TreeNode tree_nodes[]; };
 
 // The nodes of one branch of this many slots lie side by side. Most trees have one or two nodes, so this gives neighbouring invocations equal
 // work. A range of pixels has a multiple of this many slots.
-const uint TREE_BLOCK = 64u;
+const uint TREE_BLOCK = 64u; // export
 
 // Number of a node.
 uint tree_node_of(uint slot, uint branch) {

@@ -6,7 +6,7 @@ use crate::{
     passes::gbuffer::GBuffer,
     resident::Handles,
     shaders::{
-        consts::TREE_WIDTH,
+        consts::{TREE_BLOCK, TREE_WIDTH},
         igi::{ray_tree_direct, ray_tree_gather, ray_tree_gather_picks, ray_tree_grow, ray_tree_sum},
         types,
     },
@@ -14,6 +14,7 @@ use crate::{
 
 /// Pixels whose ray trees are in memory at one time.
 const SLOTS: u32 = 1 << 16;
+const _: () = assert!(SLOTS.is_multiple_of(TREE_BLOCK));
 
 /// The light of all ray trees.
 #[derive(Clone, Copy, Debug)]

@@ -218,7 +218,8 @@ fn one(
 ) -> Result<Light> {
     let begun = Instant::now();
     let (pose, view) = wanted.placed(size)?;
-    let layers = layers || matches!(wanted.shows, Shows::Layer(_));
+    // The list of images is that of a picture with all layers, whose smooth edges are images of their own.
+    let layers = layers || matches!(wanted.shows, Shows::Layer(_) | Shows::Image(_));
     let go_on = || !shared.is_for_another(wanted);
     let take = Take { pose: &pose, view, layers, exposure: chosen(live, wanted).unwrap_or(0.0), go_on: &go_on };
     let made = live.single(wanted, &take)?;
