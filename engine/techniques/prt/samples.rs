@@ -62,10 +62,16 @@ impl Thinning {
         let cell = |v: Vec3| (v / self.radius).floor().as_ivec3();
         let share = |point: &PrtPoint| share_in_gap(point.area, self.radius, self.gaps);
         let own_share = share(candidate);
+        // No sample from here on is close, whatever its normal; with more than the rounding error of unit normals.
+        let far = 1.0001 * (self.radius * own_share).powi(2);
         let close = |other: &u32| {
+            let number = *other as usize;
+            let other = &self.samples[number];
+            if position(other).distance_squared(at) > far {
+                return false;
+            }
             // A picture on a wall has samples of its own, and so has each book on a shelf.
-            let strange = if self.components[*other as usize] == component { 1.0 } else { 0.6 };
-            let other = &self.samples[*other as usize];
+            let strange = if self.components[number] == component { 1.0 } else { 0.6 };
             let least = strange * self.radius * (0.5 + 0.5 * side(other).dot(side(candidate)));
             // A step to a parallel surface counts as a way along the surface that is longer.
             let way = position(other) - at;
