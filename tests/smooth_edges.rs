@@ -145,7 +145,8 @@ fn lit_surfaces_are_nearer_to_the_mean_of_pictures() {
         let [one, smooth, mean] = studio.three(&eye());
         let [before, after] = [&one, &smooth].map(|found| error(found, &mean));
         println!("error relative to the mean of {PLACES} pictures: {before} of one picture, {after} with smooth edges");
-        assert!(after < 0.5 * before, "{after} {before}");
+        // Where the planes of two sides of a box meet, only their normals tell them apart; without normals this is 0.49.
+        assert!(after < 0.46 * before, "{after} {before}");
         let sums = [&smooth, &mean].map(|picture| picture.iter().map(|light| light.element_sum()).sum::<f64>());
         assert!((sums[0] / sums[1] - 1.0).abs() < 2e-3, "{sums:?}");
         assert!(studio.shoot(&eye(), Some(places())) == smooth);
@@ -159,13 +160,14 @@ fn colours_tell_surfaces_apart() {
     let of = |colour| Material { ior: 1.0, ..Material::diffuse("matt", colour) };
     let [table, sheet] = [vec3(0.4, 0.2, 0.1), vec3(0.8, 0.8, 0.7)].map(|colour| stage.material(of(colour)));
     stage.quad(table, vec3(-9.0, 0.0, -9.0), vec3(0.0, 0.0, 18.0), vec3(18.0, 0.0, 0.0));
-    stage.quad(sheet, vec3(-0.5, 0.0005, 0.2), vec3(0.1, 0.0, 0.9), vec3(0.9, 0.0, -0.1));
+    stage.quad(sheet, vec3(-0.5, 0.002, 0.2), vec3(0.1, 0.0, 0.9), vec3(0.9, 0.0, -0.1));
     stage.point(vec3(0.5, 6.0, 2.0), Vec3::splat(90.0));
     with_gpu(|gpu| {
         let [one, smooth, mean] = Studio::new(gpu, &stage.scene).three(&eye());
         let [before, after] = [&one, &smooth].map(|found| error(found, &mean));
         println!("error relative to the mean of {PLACES} pictures: {before} of one picture, {after} with smooth edges");
-        assert!(after < 0.2 * before, "{after} {before}");
+        // The edge of the table against the sky is most of the error of one picture.
+        assert!(after < 0.05 * before, "{after} {before}");
     });
 }
 
