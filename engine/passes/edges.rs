@@ -21,7 +21,8 @@ use glam::Vec2;
 /// Places of each pixel. The first one is the middle, which has the light.
 pub const PLACES: usize = 8;
 
-/// The share of each pixel's neighbours in its light.
+/// The shares of the eight neighbours of each pixel in its light, 0 to 1; the pixel itself has the rest. Two images in RGBA32F, in the order
+/// of `passes/edges.glsl`.
 #[derive(Clone, Copy, Debug)]
 pub struct Weights {
     before: Image,

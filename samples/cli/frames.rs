@@ -215,7 +215,7 @@ impl<T: Technique> Work<'_, T> {
         let Rendered { layers, frame, view } = rendered;
         let report = frame.report.clone();
         drop(frame);
-        // An image of the graph is what it is.
+        // With --view the file has an image of the graph and no layers of a picture.
         run.name_exact(if self.args.view.is_none() { run.smooth.exact(&layers) } else { Vec::new() });
         self.write(run, of, (layers, view), begun, progress, |time| vec![(time, report)])
     }

@@ -39,7 +39,7 @@ struct PathSettings {
     uint turns;                // rays per surface
     uint turn_ways[4];         // kind of each of these rays; the first is ON
     uint slots;                // of one sample
-    uint first_slot;           // of the pixels that have sums
+    uint first_slot;           // slot of the first pixel that has sums
     uint capacity;             // maximum of paths
     uint sum_pixels;           // pixels that have sums
     uvec2 sums_at;             // addresses (lib/scene_at.glsl)

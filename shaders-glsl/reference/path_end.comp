@@ -1,5 +1,5 @@
-// The end of paths (reference/path.comp): adds their light and their first surfaces to the sums. An invocation has all samples of a pixel and adds
-// them in order, so that the sums have the same bits for any division of the work.
+// The end of paths (reference/path.comp): adds their light and their first surfaces to the sums. One invocation adds all samples of a
+// pixel, in their order, so that the sums have the same bits for any division of the work.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
