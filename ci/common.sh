@@ -12,16 +12,25 @@ fail() { printf 'error: %s\n' "$*" >&2; exit 1; }
 
 # stage NAME COMMAND...: runs the command and says how long it took. Stops the script when the command fails.
 stage() {
-    local name=$1 start=$SECONDS status=0
+    local name=$1 start=$SECONDS processor status=0
+    processor=$(processor_seconds)
     shift
     printf '\n== %s\n' "$name"
     "$@" || status=$?
     if [ "$status" -eq 0 ]; then
-        printf '== %s: ok, %d s\n' "$name" $((SECONDS - start))
+        # Both figures: a stage that does not fill all cores could run beside another one.
+        printf '== %s: ok, %d s, of processors %d s\n' "$name" $((SECONDS - start)) $(($(processor_seconds) - processor))
     else
         printf '== %s: FAILED (exit code %d), %d s\n' "$name" "$status" $((SECONDS - start))
         exit "$status"
     fi
+}
+
+# Seconds of processor time of the programs that this shell has waited for; 0 where the system does not tell.
+processor_seconds() {
+    local -a fields=()
+    if [ -r "/proc/$$/stat" ]; then read -ra fields <"/proc/$$/stat"; fi
+    printf '%d' $(((${fields[15]:-0} + ${fields[16]:-0}) / $(getconf CLK_TCK 2>/dev/null || printf 100)))
 }
 
 # The version of a package in Cargo.lock.

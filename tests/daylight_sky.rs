@@ -64,7 +64,7 @@ fn the_patches_divide_the_sphere() {
         assert_eq!(patch_of(patch_direction(patch).map(|value| value * 37.5)), patch);
     }
     for patch in 0..GROUND_PATCH {
-        for direction in patch_samples(patch, 7) {
+        for direction in patch_samples(patch, [7, 7]) {
             assert_eq!(patch_of(direction.map(|value| value as f32)), patch);
         }
     }
@@ -138,13 +138,43 @@ fn the_patches_carry_the_energy_of_the_model() {
             assert!(close(f64::from(sky.diffuse_horizontal()[c]), horizontal[c], 0.001));
             let cosines: f64 = (0..GROUND_PATCH)
                 .map(|i| {
-                    let sine = patch_samples(i, 16).map(|direction| direction[1]).sum::<f64>() / 256.0;
+                    let sine = patch_samples(i, [16, 16]).map(|direction| direction[1]).sum::<f64>() / 256.0;
                     f64::from(patches[i][c]) * patch_solid_angle(i) * sine
                 })
                 .sum();
             // The mean over a patch loses the change of the radiance with the altitude inside the patch.
             assert!(close(cosines, horizontal[c], 0.04), "{cosines} {}", horizontal[c]);
         }
+    }
+}
+
+#[test]
+fn each_patch_has_the_mean_of_a_fine_grid() {
+    for turbidity in [1.0, 3.0, 9.0] {
+        for elevation in [-2.0, 0.0, 4.0, 30.0, 60.0, 88.0] {
+            let sky = sky(weather(turbidity, 0.0), elevation);
+            for (patch, found) in sky.patches().into_iter().take(GROUND_PATCH).enumerate() {
+                let samples = patch_samples(patch, [32, 32]);
+                let mean = samples.map(|d| y(sky.radiance(d.map(|v| v as f32)))).sum::<f64>() / 1024.0;
+                assert!(close(y(found), mean, 0.005), "{turbidity} {elevation} {patch}: {} {mean}", y(found));
+            }
+        }
+    }
+}
+
+#[test]
+fn a_sky_with_another_overcast_share_is_that_of_its_weather() {
+    for elevation in [-3.0, 0.1, 40.0] {
+        let clear = sky(weather(3.0, 0.2), elevation);
+        for overcast in [0.0, 0.7, 1.0] {
+            let (found, wanted) = (clear.with_overcast(overcast).unwrap(), sky(weather(3.0, overcast), elevation));
+            assert_eq!(found.patches(), wanted.patches());
+            assert_eq!(found.sun_irradiance(), wanted.sun_irradiance());
+            assert_eq!(found.diffuse_horizontal(), wanted.diffuse_horizontal());
+            assert_eq!(found.global_horizontal(), wanted.global_horizontal());
+            assert_eq!(found.radiance([0.3, 0.5, -0.2]), wanted.radiance([0.3, 0.5, -0.2]));
+        }
+        assert!(clear.with_overcast(1.2).is_err());
     }
 }
 

@@ -93,9 +93,10 @@ fn vectors_come_close_to_brute_force() {
             let found = Studio::new(gpu, &scene, settings, None).irradiance(&under(24), settings);
             nrmse(&reference, &found)
         };
-        let coarse = error(&coarse());
+        let mut studio = Studio::new(gpu, &scene, &coarse(), None);
+        let [coarse, nearest] = [true, false]
+            .map(|trilinear| nrmse(&reference, &studio.irradiance(&under(24), &Settings { trilinear, ..coarse() })));
         let fine = error(&Settings { size: 16, ..Settings::default() });
-        let nearest = error(&Settings { trilinear: false, ..self::coarse() });
         let unshadowed = error(&by(Method::Unshadowed));
         eprintln!("NRMSE: coarse {coarse:.4}, fine {fine:.4}, nearest {nearest:.4}, unshadowed {unshadowed:.4}");
         assert!(coarse < 0.06 && fine < coarse && coarse < nearest && nearest < 0.5 * unshadowed);
@@ -106,7 +107,9 @@ fn vectors_come_close_to_brute_force() {
 fn shadows_of_disjoint_occluders_add_and_their_order_is_nothing() {
     with_gpu(|gpu| {
         let places = [vec3(-0.8, 0.9, 0.2), vec3(0.9, 1.1, -0.6), vec3(0.1, 1.5, 0.9)];
-        let settings = Settings { overlap: false, ..coarse() };
+        // Pictures by vectors are held against each other, so a few samples do.
+        let few = || Settings { azimuths: 16, polars: 9, radii: 8, ..coarse() };
+        let settings = Settings { overlap: false, ..few() };
         let render = |balls: &[Vec3], settings: &Settings| {
             Studio::new(gpu, &stage(colourful(), balls), settings, None).irradiance(&under(12), settings)
         };
@@ -118,14 +121,14 @@ fn shadows_of_disjoint_occluders_add_and_their_order_is_nothing() {
             assert!((*e - left.max(Vec3::ZERO)).length() < 1e-4 * open[i].length(), "{e} instead of {left}");
         }
         // With the overlap correction the order of occluders has no effect.
-        let settings = coarse();
+        let settings = few();
         let (one, other) = (render(&places, &settings), render(&[places[2], places[0], places[1]], &settings));
         for (i, (a, b)) in one.iter().zip(&other).enumerate() {
             assert!((*a - *b).length() < 1e-5 * open[i].length(), "{a} {b}");
             assert!(a.cmpge(all[i] - 1e-4 * open[i]).all(), "the correction never darkens: {a} {}", all[i]);
         }
         // With filled discs, several occluders at one place hide as much as a single one.
-        let settings = Settings { shared: Shared::Discs, ..coarse() };
+        let settings = Settings { shared: Shared::Discs, ..few() };
         // The same holds for occluders whose distances are roundings.
         let (one, many) = (render(&places[..1], &settings), render(&[places[0]; 5], &settings));
         let roundings = [0.0, 1e-7, -2e-7, 4e-7, -1e-6].map(|d| places[0] + d * vec3(1.0, 0.7, -0.4));
@@ -216,17 +219,16 @@ fn a_body_with_a_hollow_shadows_itself_as_by_brute_force() {
             let picture = |settings: &Settings| Studio::new(gpu, &scene, settings, None).irradiance(&view, settings);
             let truth = picture(&by(Method::BruteForce));
             let error = |settings: &Settings| nrmse(&truth, &picture(settings));
-            let surface = error(&coarse());
-            let online = error(&by(Method::Online));
-            let spheres = error(&Settings { self_samples: SelfSamples::Spheres, ..coarse() });
-            let none = error(&Settings { self_shadow: false, ..coarse() });
-            eprintln!(
-                "NRMSE of a body's shadow on itself: {surface:.4}, in the frame {online:.4}, from spheres {spheres:.4}, \
-                 without {none:.4}"
-            );
-            assert!(surface < 0.05 && surface < 0.5 * spheres && surface < 0.5 * none, "{local}");
+            let (surface, online) = (error(&coarse()), error(&by(Method::Online)));
+            eprintln!("NRMSE of a body's shadow on itself: {surface:.4}, in the frame {online:.4}");
             // A ray that touches an edge may pass on the other side of it.
-            assert!(online < 0.005, "{local}: {online}");
+            assert!(surface < 0.05 && online < 0.005, "{local}: {surface} {online}");
+            if local == Mat4::IDENTITY {
+                let spheres = error(&Settings { self_samples: SelfSamples::Spheres, ..coarse() });
+                let none = error(&Settings { self_shadow: false, ..coarse() });
+                eprintln!("from spheres {spheres:.4}, without {none:.4}");
+                assert!(surface < 0.5 * spheres && surface < 0.5 * none, "{surface} {spheres} {none}");
+            }
         }
     });
 }
@@ -451,14 +453,16 @@ fn the_light_on_a_body_turns_between_samples_of_turns() {
         // Halfway between two samples, whose bowls open to both sides of the view.
         let angle = 2.5 * PI as f32 / 4.0;
         let settings = Settings { turns: 8, ..coarse() };
-        let still = body(0.0);
+        let one = Settings { turns: 1, adaptive: false, ..settings.clone() };
+        let (still, made) = (body(0.0), body(angle));
         let mut pose = Pose::rest(&still);
         pose.world[0] = Mat4::from_rotation_y(angle);
+        let mut studio = Studio::new(gpu, &still, &settings, None);
+        let mut other = Studio::new(gpu, &made, &one, None);
         for from in [vec3(0.3, 1.0, -2.0), vec3(2.0, 0.8, 0.3), vec3(-0.4, 2.0, 0.2)] {
             let view = flat_view(from, Vec3::ZERO, 1.1, [24, 24]);
-            let found = Studio::new(gpu, &still, &settings, None).shot(&pose, &view, &settings).0;
-            let one = Settings { turns: 1, adaptive: false, ..settings.clone() };
-            let exact = Studio::new(gpu, &body(angle), &one, None).irradiance(&view, &one);
+            let found = studio.shot(&pose, &view, &settings).0;
+            let exact = other.irradiance(&view, &one);
             let apart = nrmse(&exact, &found);
             eprintln!("seen from {from}: {apart:.4} from a mesh that is turned");
             assert!(apart < 0.05, "{from}: {apart}");

@@ -58,7 +58,7 @@ fn a_lamp_that_moves_changes_the_light_no_faster_than_the_truth_does() {
             })
             .collect();
         let ([ours, truth], areas) =
-            films(gpu, &room(), &Baking { samples: 3000, directions: 2016, visibility: 50, ..small() }, &path);
+            films(gpu, &room(), &Baking { samples: 2000, directions: 2016, visibility: 50, ..small() }, &path);
         for part in 0..2 {
             let level = truth.iter().map(|frame| root(&areas, |i| frame[part][i])).sum::<f32>() / STEPS as f32;
             let first = |film: &Film, t: usize| root(&areas, |i| film[(t + 1) % STEPS][part][i] - film[t][part][i]);

@@ -121,7 +121,7 @@ fn lamps_behind_walls_and_in_closed_furniture_light_nothing_outside() {
         }
         // The bake's own lamp is in the cabinet: both its inside and the room have samples.
         let hidden = moved(&scene, vec3(-1.1, 0.7, -1.1));
-        let stored = baked_with_rooms(gpu, &hidden, &Baking { samples: 6000, ..small() });
+        let stored = baked_with_rooms(gpu, &hidden, &Baking { samples: 4000, ..small() });
         let area: f64 = stored.samples.iter().map(|sample| f64::from(sample.area)).sum();
         // 80 m² of walls, 5 sides of 1.96 m² outside and 6 inside; below the cabinet there is no light.
         assert!((area / (80.0 + 11.0 * 1.96 - 1.96) - 1.0).abs() < 0.03, "{area}");

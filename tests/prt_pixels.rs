@@ -121,7 +121,7 @@ fn weights_sum_to_one_so_even_light_stays_even() {
 fn three_ways_show_the_same_room_and_splats_have_the_same_bits_again() {
     with_gpu(|gpu| {
         let scene = divided(0.1);
-        let stored = baked(gpu, &scene, &Baking { samples: 8000, cluster: 500, ..small() });
+        let stored = baked(gpu, &scene, &Baking { samples: 4000, cluster: 500, ..small() });
         let eye = view(vec3(1.6, 1.9, 1.2), vec3(-0.6, 0.7, -0.6), 75.0, [64, 48]);
         let [gather, splats, vertices] = WAYS.map(|spread| picture(gpu, &scene, &stored, &eye, &by(spread)));
         for (name, most) in [("indirect", 0.02), ("direct", 0.03)] {

@@ -1,7 +1,8 @@
 //! Tone mapping on the device against its CPU twin: RMS % and mean % of luminance ([TM 18], [TM 19]).
 //!
-//! `cargo test --test tonemap tonemap_twin -- --nocapture` prints the table for parts of all images of the collection;
-//! `cargo test --release --test tonemap tonemap_twin -- --ignored --nocapture` for whole images.
+//! `cargo test --test tonemap tonemap_twin -- --nocapture` prints the table, each way for a third of the images of the collection, reduced to 48
+//! pixels on a side; `cargo test --release --test tonemap tonemap_twin -- --ignored --nocapture` for all of them with 192 pixels. Whole images would
+//! take hours: the slow program looks at every neighbour of every pixel.
 
 use crate::common;
 use std::path::Path;
@@ -90,9 +91,10 @@ fn errors(cpu: &[[f32; 3]], gpu: &[[f32; 4]]) -> [f64; 2] {
     [100.0 * f64::sqrt(squares / count), 100.0 * sum / count]
 }
 
-fn compare(gpu: &Gpu, pictures: &[Picture]) {
+/// Every way with one of `each` pictures: the first way with the first one, the second with the second one, and so on.
+fn compare(gpu: &Gpu, pictures: &[Picture], each: usize) {
     let mut wrong = Vec::new();
-    for settings in all() {
+    for (number, settings) in all().into_iter().enumerate() {
         let mut name =
             format!("{} {:?} {:?}", settings.operator.name(), settings.mode(), settings.local).to_lowercase();
         if settings.contrast_limit.is_some() {
@@ -103,7 +105,8 @@ fn compare(gpu: &Gpu, pictures: &[Picture]) {
         }
         let mut device = tonemap::Still::new(gpu, &settings).unwrap();
         let mut worst = [0.0f64; 2];
-        for picture in pictures {
+        let some = pictures.iter().skip(number % each).step_by(each);
+        for picture in some.clone() {
             let Picture { width, height, ref pixels, .. } = *picture;
             let cpu = twin::tonemap(width, height, pixels, &settings);
             let with_alpha: Vec<[f32; 4]> = pixels.iter().map(|p| [p[0], p[1], p[2], 1.0]).collect();
@@ -118,17 +121,17 @@ fn compare(gpu: &Gpu, pictures: &[Picture]) {
             }
             worst = [worst[0].max(found[0]), worst[1].max(found[1])];
         }
-        println!("{name:28} worst of {} images: RMS {:.5} %, mean {:.5} %\n", pictures.len(), worst[0], worst[1]);
+        println!("{name:28} worst of {} images: RMS {:.5} %, mean {:.5} %\n", some.len(), worst[0], worst[1]);
     }
     assert!(wrong.is_empty(), "over {ALLOWED:?}:\n{}", wrong.join("\n"));
 }
 
 #[test]
-fn agrees_on_all_images_reduced() {
+fn agrees_on_images_reduced() {
     let Some(assets) = common::assets() else { return };
     let pictures: Vec<Picture> = pictures(&assets).iter().map(|p| p.reduced(48)).collect();
     assert!(pictures.len() >= 12, "only {} images open", pictures.len());
-    with_gpu(|gpu| compare(gpu, &pictures));
+    with_gpu(|gpu| compare(gpu, &pictures, 3));
 }
 
 impl Picture {
@@ -197,8 +200,9 @@ fn no_halo_and_no_blocks_at_the_strongest_edges_that_the_slow_program_lacks() {
 }
 
 #[test]
-#[ignore = "whole images take minutes without optimisation"]
-fn agrees_on_whole_images() {
+#[ignore = "takes minutes"]
+fn agrees_on_large_images() {
     let Some(assets) = common::assets() else { return };
-    with_gpu(|gpu| compare(gpu, &pictures(&assets)));
+    let pictures: Vec<Picture> = pictures(&assets).iter().map(|p| p.reduced(192)).collect();
+    with_gpu(|gpu| compare(gpu, &pictures, 1));
 }

@@ -70,6 +70,15 @@ pub fn patch_solid_angle(patch: usize) -> f64 {
     (high.sin() - low.sin()) * TAU / ROW_COUNTS[row] as f64
 }
 
+/// The mean of the sine of the altitude over a sky patch, weighted by solid angle.
+///
+/// # Panics
+/// Panics if `patch` is not a sky patch.
+pub(super) fn mean_sine(patch: usize) -> f64 {
+    let (low, high) = row_range(row_and_column(patch).0);
+    0.5 * (low.sin() + high.sin())
+}
+
 /// The unit direction at the centre of a patch: the middle of its altitudes and azimuths, the zenith for the cap, and
 /// the nadir for the ground.
 ///
@@ -88,19 +97,19 @@ pub fn patch_direction(patch: usize) -> [f32; 3] {
     direction((0.5 * (low + high)).sin(), azimuth).map(|value| value as f32)
 }
 
-/// The midpoints of a grid of `size` x `size` cells of equal solid angle in a sky patch, as unit directions.
+/// The midpoints of a grid of cells of equal solid angle in a sky patch, as unit directions: so many `rows` of altitude, and so many `columns` of azimuth.
 ///
 /// # Panics
 /// Panics if `patch` is not a sky patch.
-pub fn patch_samples(patch: usize, size: usize) -> impl Iterator<Item = [f64; 3]> {
+pub fn patch_samples(patch: usize, [rows, columns]: [usize; 2]) -> impl Iterator<Item = [f64; 3]> {
     let (row, column) = row_and_column(patch);
     let (low, high) = row_range(row);
     let (low, high) = (low.sin(), high.sin());
     let width = TAU / ROW_COUNTS[row] as f64;
-    let position = move |i: usize| (i as f64 + 0.5) / size as f64;
-    (0..size * size).map(move |i| {
-        let sine = low + (high - low) * position(i / size);
-        direction(sine, (column as f64 - 0.5 + position(i % size)) * width)
+    let position = |i: usize, cells: usize| (i as f64 + 0.5) / cells as f64;
+    (0..rows * columns).map(move |i| {
+        let sine = low + (high - low) * position(i / columns, rows);
+        direction(sine, (column as f64 - 0.5 + position(i % columns, columns)) * width)
     })
 }
 

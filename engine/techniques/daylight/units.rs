@@ -2,7 +2,7 @@
 //! are there, they become the compressed [`Tile`]s of a file ([`super::finish`]).
 
 use super::{
-    Plan, Sky, Texels, Transport, Weather,
+    Plan, Sky, Texels, Transport,
     blocks::{Blocks, Coding, Layout},
     columns::{Columns, Measured},
     gathered::Gathered,
@@ -67,11 +67,12 @@ pub fn skies(plan: &Plan) -> Result<Vec<f32>> {
     let patches = SKY_PATCHES as usize;
     let mut rows = vec![1.0; patches];
     let step = plan.times.len().div_ceil(24).max(1);
+    let times = plan.times.iter().step_by(step);
+    let skies = times.map(|time| Sky::new(plan.weather, time.sun.map(f64::from))).collect::<Result<Vec<_>, _>>();
+    let skies = skies.map_err(Error::input)?;
     for overcast in [0.0, 1.0] {
-        let weather = plan.weather;
-        let weather = Weather::new(weather.turbidity(), weather.ground_albedo(), overcast).map_err(Error::input)?;
-        for time in plan.times.iter().step_by(step) {
-            let radiances = Sky::new(weather, time.sun.map(f64::from)).map_err(Error::input)?.patches();
+        for sky in &skies {
+            let radiances = sky.with_overcast(overcast).map_err(Error::input)?.patches();
             rows.extend(radiances.iter().map(|[r, g, b]| 0.2126 * r + 0.7152 * g + 0.0722 * b));
         }
     }

@@ -19,8 +19,10 @@ use crate::{
     },
 };
 
-/// Particles that are followed at once.
-const PARTICLES: u32 = 1 << 16;
+/// Particles that are followed at once, at most.
+const MOST_PARTICLES: u32 = 1 << 16;
+/// Particles that are followed at once, at least: which triangles they reach is a statistic of their hits.
+const LEAST_PARTICLES: u32 = 1 << 14;
 /// Rounds of particles at most.
 const MOST_ROUNDS: u32 = 96;
 /// Least share of the particles that are still in the scene when their hits begin to count. A cube with one side open keeps about a quarter (0.8⁵ · 5/6).
@@ -183,7 +185,7 @@ impl Bakery {
         let mut stayed = [0usize; 2];
         for round in 0..rounds {
             stop.check()?;
-            let found = self.particles(baking, starts, round * PARTICLES, thinning.most_clear())?;
+            let found = self.particles(baking, starts, round * at_once(baking), thinning.most_clear())?;
             escaped.iter_mut().zip(found.escaped).for_each(|(sum, more)| *sum += more);
             stayed[0] += found.hits.iter().filter(|hits| !hits.is_empty()).count();
             stayed[1] += found.hits.len();
@@ -197,7 +199,9 @@ impl Bakery {
                 let hits = found.hits.iter().filter_map(|hits| hits.get(turn));
                 kept += hits.filter(|hit| thinning.offer(hit, triangles.component(hit))).count();
             }
-            if thinning.samples.len() > plan::MOST_SAMPLES || kept * 100 < thinning.samples.len() {
+            // A large round adds less than 1 %.
+            let added = kept * (MOST_PARTICLES / at_once(baking)) as usize;
+            if thinning.samples.len() > plan::MOST_SAMPLES || added * 100 < thinning.samples.len() {
                 break;
             }
         }
@@ -213,37 +217,32 @@ impl Bakery {
     pub fn places(&mut self, plan: &Plan, count: u32) -> Result<Vec<[f32; 3]>> {
         let starts: Vec<Vec3> = plan.starts.iter().map(|start| Vec3::from(*start)).collect();
         // Particles after all those of a bake.
-        let found = self.particles(&plan.settings, &starts, MOST_ROUNDS * PARTICLES, 0.0)?;
+        let found = self.particles(&plan.settings, &starts, MOST_ROUNDS * at_once(&plan.settings), 0.0)?;
         Ok(free_places(&found.hits, count))
     }
 
     /// The hits of a round of particles. `most`: of the free distances above hits, metres; 0: they are not measured.
     pub(super) fn particles(&mut self, baking: &Baking, starts: &[Vec3], first: u32, most: f32) -> Result<Round> {
+        let particles = at_once(baking);
         let mut graph = Graph::new("prt.particles");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);
-        let size = u64::from(PARTICLES) * u64::from(PRT_HITS) * size_of::<PrtPoint>() as u64;
+        let size = u64::from(particles) * u64::from(PRT_HITS) * size_of::<PrtPoint>() as u64;
         let points = graph.buffer("prt.points", size);
-        let counts = graph.buffer("prt.counts", 4 * u64::from(PARTICLES));
+        let counts = graph.buffer("prt.counts", 4 * u64::from(particles));
         let places: Vec<[f32; 3]> = starts.iter().map(|start| start.to_array()).collect();
         let args = traced!(
             particles::Args {
                 starts: graph.buffer_from("prt.starts", &places),
                 points,
                 counts,
-                push: particles::Push {
-                    particles: PARTICLES,
-                    first,
-                    starts_of: places.len() as u32,
-                    seed: baking.seed,
-                    most,
-                },
+                push: particles::Push { particles, first, starts_of: places.len() as u32, seed: baking.seed, most },
             },
             rays,
             handles
         );
         let hits = PRT_FIRST_HIT + 2 * PRT_HITS;
-        graph.compute(args, PARTICLES).rays(u64::from(PARTICLES) * u64::from(hits));
+        graph.compute(args, particles).rays(u64::from(particles) * u64::from(hits));
         let (points, counts) = (graph.read_buffer(points), graph.read_buffer(counts));
         let frame = self.runner.run(&graph)?;
         let (points, counts): (Vec<PrtPoint>, Vec<u32>) = (frame.buffer(points), frame.buffer(counts));
@@ -296,6 +295,12 @@ impl Bakery {
         let free: Vec<u32> = self.runner.run(&graph)?.buffer(read);
         Ok(free.into_iter().map(|free| (free as f32 / OPEN_RAYS as f32).max(LEAST_OPEN)).collect())
     }
+}
+
+/// Particles that are followed at once: fewer in a small bake, which has enough sooner.
+fn at_once(baking: &Baking) -> u32 {
+    (3 * u64::from(baking.samples) / 2).min(MOST_PARTICLES.into()).max(LEAST_PARTICLES.into()).next_power_of_two()
+        as u32
 }
 
 /// The error for a scene that is no room.
