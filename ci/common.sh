@@ -19,14 +19,15 @@ stage() {
     "$@" || status=$?
     if [ "$status" -eq 0 ]; then
         # Both figures: a stage that does not fill all cores could run beside another one.
-        printf '== %s: ok, %d s, of processors %d s\n' "$name" $((SECONDS - start)) $(($(processor_seconds) - processor))
+        printf '== %s: ok, %d s, %d s of processor time\n' "$name" $((SECONDS - start)) $(($(processor_seconds) - processor))
     else
         printf '== %s: FAILED (exit code %d), %d s\n' "$name" "$status" $((SECONDS - start))
         exit "$status"
     fi
 }
 
-# Seconds of processor time of the programs that this shell has waited for; 0 where the system does not tell.
+# Seconds of processor time of the programs that the script's own shell has waited for; 0 where the system does not tell. A subshell in the
+# background counts when it has been waited for.
 processor_seconds() {
     local -a fields=()
     if [ -r "/proc/$$/stat" ]; then read -ra fields <"/proc/$$/stat"; fi

@@ -150,13 +150,21 @@ fn the_patches_carry_the_energy_of_the_model() {
 
 #[test]
 fn each_patch_has_the_mean_of_a_fine_grid() {
-    for turbidity in [1.0, 3.0, 9.0] {
-        for elevation in [-2.0, 0.0, 4.0, 30.0, 60.0, 88.0] {
-            let sky = sky(weather(turbidity, 0.0), elevation);
+    // Suns at the middle of a column, and between two of them.
+    for (turbidity, albedo, azimuth) in [(1.0, 0.0, 0.0f64), (3.0, 0.5, 0.1), (10.0, 0.5, 0.13), (10.0, 0.0, 0.05)] {
+        for elevation in [-2.0, 0.0, 4.0, 17.0, 30.0, 60.0, 88.0f64] {
+            let (sine, cosine) = elevation.to_radians().sin_cos();
+            let sun = [cosine * azimuth.sin(), sine, -cosine * azimuth.cos()];
+            let sky = Sky::new(Weather::new(turbidity, albedo, 0.0).unwrap(), sun).unwrap();
             for (patch, found) in sky.patches().into_iter().take(GROUND_PATCH).enumerate() {
-                let samples = patch_samples(patch, [32, 32]);
-                let mean = samples.map(|d| y(sky.radiance(d.map(|v| v as f32)))).sum::<f64>() / 1024.0;
-                assert!(close(y(found), mean, 0.005), "{turbidity} {elevation} {patch}: {} {mean}", y(found));
+                let mut mean = [0.0; 3];
+                for direction in patch_samples(patch, [32, 32]) {
+                    let radiance = sky.radiance(direction.map(|value| value as f32));
+                    mean.iter_mut().zip(radiance).for_each(|(sum, value)| *sum += f64::from(value) / 1024.0);
+                }
+                let allowed = 0.005 * luminance(mean) + 1e-9;
+                let off = (0..3).map(|i| (f64::from(found[i]) - mean[i]).abs()).fold(0.0, f64::max);
+                assert!(off <= allowed, "{turbidity} {albedo} {azimuth} {elevation} {patch}: {found:?} {mean:?}");
             }
         }
     }

@@ -91,7 +91,7 @@ fn errors(cpu: &[[f32; 3]], gpu: &[[f32; 4]]) -> [f64; 2] {
     [100.0 * f64::sqrt(squares / count), 100.0 * sum / count]
 }
 
-/// Every way with one of `each` pictures: the first way with the first one, the second with the second one, and so on.
+/// Compares each way with every `each`-th picture, from another first picture for each way.
 fn compare(gpu: &Gpu, pictures: &[Picture], each: usize) {
     let mut wrong = Vec::new();
     for (number, settings) in all().into_iter().enumerate() {

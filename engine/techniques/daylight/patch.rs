@@ -97,7 +97,8 @@ pub fn patch_direction(patch: usize) -> [f32; 3] {
     direction((0.5 * (low + high)).sin(), azimuth).map(|value| value as f32)
 }
 
-/// The midpoints of a grid of cells of equal solid angle in a sky patch, as unit directions: so many `rows` of altitude, and so many `columns` of azimuth.
+/// The midpoints of a grid of cells of equal solid angle in a sky patch, as unit directions. The grid has `rows` rows of
+/// altitude and `columns` columns of azimuth.
 ///
 /// # Panics
 /// Panics if `patch` is not a sky patch.

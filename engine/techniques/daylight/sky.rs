@@ -164,10 +164,11 @@ impl Sky {
         self.global_horizontal.map(|value| value as f32)
     }
 
-    /// The mean radiance of each patch of the module `patch`, [`PATCHES`] values. The mean is that of a fixed grid of
-    /// cells of equal solid angle: 12 × 12 within 30° of the sun, 12 of altitude × 4 of azimuth in the lowest row, where
-    /// the haze brightens towards the horizon, and 4 × 4 elsewhere. No patch differs by more than 0.5 % from the mean of a
-    /// fine grid, and all of them together carry the energy of the model to 0.1 %. A horizontal irradiance that is computed
+    /// The mean radiance of each patch of the module `patch`, [`PATCHES`] values. The mean is that of a grid of cells of
+    /// equal solid angle: 12 × 12 where the centre of the patch is within 30° of the sun, else 12 of altitude × 4 of
+    /// azimuth in the lowest row, where the haze brightens towards the horizon, and 4 × 4 elsewhere. A channel differs from
+    /// the mean of a fine grid by at most 0.5 % of the patch's luminance, and all patches together carry the energy of the
+    /// model to 0.1 %. A horizontal irradiance that is computed
     /// from the patches differs by up to 4 % when a low sun is in haze, because a patch has one radiance for 12° of altitude.
     pub fn patches(&self) -> Vec<[f32; 3]> {
         self.patches.clone()

@@ -5,6 +5,7 @@ use glam::Vec3;
 use super::{
     Bakery, Baking, Starts,
     samples::{self, Triangles},
+    sampling::MOST_PARTICLES,
 };
 use crate::{Error, Result, Stop, shaders::types::PrtPoint};
 
@@ -50,7 +51,7 @@ impl Bakery {
         let mut least = None;
         for room in 0..MOST_ROOMS {
             stop.check()?;
-            let hits = self.particles(baking, &fresh, 0, 0.0)?.hits;
+            let hits = self.particles((baking.seed, &fresh), 0..MOST_PARTICLES, 0.0)?.hits;
             hits.iter().flatten().for_each(|hit| triangles.count(hit));
             let least = *least.get_or_insert(LEAST * free_path(hits.iter()));
             let usual = triangles.usual();
@@ -59,7 +60,7 @@ impl Bakery {
             if places.is_empty() {
                 return Ok(room);
             }
-            let found = self.particles(baking, &places, 0, 0.0)?.hits;
+            let found = self.particles((baking.seed, &places), 0..MOST_PARTICLES, 0.0)?.hits;
             // Particle after particle starts at the next place.
             let of = |place: usize| found.iter().skip(place).step_by(places.len());
             // The middle between two hits of one particle is in the free space.

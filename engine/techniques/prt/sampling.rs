@@ -1,5 +1,7 @@
 //! The samples of a room: particles, their thinned hits, and the surroundings of the samples.
 
+use std::ops::Range;
+
 use glam::Vec3;
 
 use super::{
@@ -19,11 +21,11 @@ use crate::{
     },
 };
 
-/// Particles that are followed at once, at most.
-const MOST_PARTICLES: u32 = 1 << 16;
-/// Particles that are followed at once, at least: which triangles they reach is a statistic of their hits.
+/// Most particles that are followed at once.
+pub(super) const MOST_PARTICLES: u32 = 1 << 16;
+/// Fewest particles that are followed at once. With fewer, hits do not tell which triangles particles reach.
 const LEAST_PARTICLES: u32 = 1 << 14;
-/// Rounds of particles at most.
+/// Most rounds of [`MOST_PARTICLES`].
 const MOST_ROUNDS: u32 = 96;
 /// Least share of the particles that are still in the scene when their hits begin to count. A cube with one side open keeps about a quarter (0.8⁵ · 5/6).
 const LEAST_INSIDE: f64 = 0.05;
@@ -183,9 +185,12 @@ impl Bakery {
         let mut places = Vec::new();
         let mut escaped = [0u64; 2];
         let mut stayed = [0usize; 2];
-        for round in 0..rounds {
+        // Small rounds are more.
+        let (at_once, smaller) = (at_once(baking), MOST_PARTICLES / at_once(baking));
+        for round in 0..rounds * smaller {
             stop.check()?;
-            let found = self.particles(baking, starts, round * at_once(baking), thinning.most_clear())?;
+            let number = round * at_once..(round + 1) * at_once;
+            let found = self.particles((baking.seed, starts), number, thinning.most_clear())?;
             escaped.iter_mut().zip(found.escaped).for_each(|(sum, more)| *sum += more);
             stayed[0] += found.hits.iter().filter(|hits| !hits.is_empty()).count();
             stayed[1] += found.hits.len();
@@ -199,8 +204,8 @@ impl Bakery {
                 let hits = found.hits.iter().filter_map(|hits| hits.get(turn));
                 kept += hits.filter(|hit| thinning.offer(hit, triangles.component(hit))).count();
             }
-            // A large round adds less than 1 %.
-            let added = kept * (MOST_PARTICLES / at_once(baking)) as usize;
+            // It ends when a round of MOST_PARTICLES would add less than 1 %.
+            let added = kept * smaller as usize;
             if thinning.samples.len() > plan::MOST_SAMPLES || added * 100 < thinning.samples.len() {
                 break;
             }
@@ -217,13 +222,19 @@ impl Bakery {
     pub fn places(&mut self, plan: &Plan, count: u32) -> Result<Vec<[f32; 3]>> {
         let starts: Vec<Vec3> = plan.starts.iter().map(|start| Vec3::from(*start)).collect();
         // Particles after all those of a bake.
-        let found = self.particles(&plan.settings, &starts, MOST_ROUNDS * at_once(&plan.settings), 0.0)?;
+        let first = MOST_ROUNDS * MOST_PARTICLES;
+        let found = self.particles((plan.settings.seed, &starts), first..first + at_once(&plan.settings), 0.0)?;
         Ok(free_places(&found.hits, count))
     }
 
-    /// The hits of a round of particles. `most`: of the free distances above hits, metres; 0: they are not measured.
-    pub(super) fn particles(&mut self, baking: &Baking, starts: &[Vec3], first: u32, most: f32) -> Result<Round> {
-        let particles = at_once(baking);
+    /// The hits of a round of particles, which have these numbers. `most`: of the free distances above hits, metres; 0: they are not measured.
+    pub(super) fn particles(
+        &mut self,
+        (seed, starts): (u32, &[Vec3]),
+        numbers: Range<u32>,
+        most: f32,
+    ) -> Result<Round> {
+        let particles = numbers.end - numbers.start;
         let mut graph = Graph::new("prt.particles");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);
@@ -236,7 +247,7 @@ impl Bakery {
                 starts: graph.buffer_from("prt.starts", &places),
                 points,
                 counts,
-                push: particles::Push { particles, first, starts_of: places.len() as u32, seed: baking.seed, most },
+                push: particles::Push { particles, first: numbers.start, starts_of: places.len() as u32, seed, most },
             },
             rays,
             handles

@@ -19,7 +19,7 @@ use crate::{
 /// The name of such jobs.
 pub const KIND: &str = "prt";
 /// Increased whenever the computation changes.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// Numbers of the stages. All machines put the same samples on the surfaces; the one unit of the last stage keeps them for the file.
 pub const VISIBILITY: u32 = 0;
