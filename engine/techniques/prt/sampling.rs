@@ -23,7 +23,7 @@ use crate::{
 
 /// Most particles that are followed at once.
 pub(super) const MOST_PARTICLES: u32 = 1 << 16;
-/// Fewest particles that are followed at once. With fewer, hits do not tell which triangles particles reach.
+/// Fewest particles that are followed at once: their hits also tell which triangles particles reach.
 const LEAST_PARTICLES: u32 = 1 << 14;
 /// Most rounds of [`MOST_PARTICLES`].
 const MOST_ROUNDS: u32 = 96;
@@ -185,7 +185,7 @@ impl Bakery {
         let mut places = Vec::new();
         let mut escaped = [0u64; 2];
         let mut stayed = [0usize; 2];
-        // Small rounds are more.
+        // A bake with smaller rounds may have more of them.
         let (at_once, smaller) = (at_once(baking), MOST_PARTICLES / at_once(baking));
         for round in 0..rounds * smaller {
             stop.check()?;
@@ -204,7 +204,7 @@ impl Bakery {
                 let hits = found.hits.iter().filter_map(|hits| hits.get(turn));
                 kept += hits.filter(|hit| thinning.offer(hit, triangles.component(hit))).count();
             }
-            // It ends when a round of MOST_PARTICLES would add less than 1 %.
+            // Thinning ends when a round of MOST_PARTICLES would add less than 1 %.
             let added = kept * smaller as usize;
             if thinning.samples.len() > plan::MOST_SAMPLES || added * 100 < thinning.samples.len() {
                 break;
@@ -223,11 +223,11 @@ impl Bakery {
         let starts: Vec<Vec3> = plan.starts.iter().map(|start| Vec3::from(*start)).collect();
         // Particles after all those of a bake.
         let first = MOST_ROUNDS * MOST_PARTICLES;
-        let found = self.particles((plan.settings.seed, &starts), first..first + at_once(&plan.settings), 0.0)?;
+        let found = self.particles((plan.settings.seed, &starts), first..first + MOST_PARTICLES, 0.0)?;
         Ok(free_places(&found.hits, count))
     }
 
-    /// The hits of a round of particles, which have these numbers. `most`: of the free distances above hits, metres; 0: they are not measured.
+    /// The hits of the particles with these numbers. `most`: largest of the free distances above hits, metres; 0: they are not measured.
     pub(super) fn particles(
         &mut self,
         (seed, starts): (u32, &[Vec3]),
@@ -308,10 +308,9 @@ impl Bakery {
     }
 }
 
-/// Particles that are followed at once: fewer in a small bake, which has enough sooner.
+/// The number of particles that a bake follows at once. A small bake needs fewer.
 fn at_once(baking: &Baking) -> u32 {
-    (3 * u64::from(baking.samples) / 2).min(MOST_PARTICLES.into()).max(LEAST_PARTICLES.into()).next_power_of_two()
-        as u32
+    baking.samples.saturating_mul(3).div_ceil(2).clamp(LEAST_PARTICLES, MOST_PARTICLES).next_power_of_two()
 }
 
 /// The error for a scene that is no room.
