@@ -4,6 +4,10 @@ root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 cache=${XDG_CACHE_HOME:-$HOME/.cache}/lucerna
 command -v cargo >/dev/null 2>&1 || PATH=$HOME/.cargo/bin:$PATH
 
+# A checkout of a build server is new: what incremental compiling keeps is of no use there, and keeping it takes time. All scripts have the
+# same setting, for cargo builds everything again when it changes.
+if [ -n "${CI:-}" ]; then export CARGO_INCREMENTAL=${CARGO_INCREMENTAL:-0}; fi
+
 # Tests with invented input take the same numbers in every run; another number here takes others.
 export PROPTEST_RNG_SEED=${PROPTEST_RNG_SEED:-1}
 

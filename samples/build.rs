@@ -16,11 +16,15 @@ fn git(arguments: &[&str]) -> Option<String> {
 
 fn main() {
     let root = Path::new(&env::var_os("CARGO_MANIFEST_DIR").unwrap_or_default()).join("..");
-    for name in sources::ROOTS.iter().filter(|name| root.join(name).exists()) {
-        println!("cargo::rerun-if-changed=../{name}");
-    }
-    match sources::digest(&root) {
-        Ok(digest) => println!("cargo::rustc-env=LUCERNA_SOURCES={digest}"),
+    // Files, not their folders: a test that leaves a file in a folder for a moment must not build the programs again. A new file is found
+    // because a file that exists has to name it.
+    match sources::list(&root).and_then(|files| Ok((files, sources::digest(&root)?))) {
+        Ok((files, digest)) => {
+            for file in files {
+                println!("cargo::rerun-if-changed=../{}", file.strip_prefix(&root).unwrap_or(&file).display());
+            }
+            println!("cargo::rustc-env=LUCERNA_SOURCES={digest}");
+        }
         Err(error) => println!("cargo::error=the sources cannot be read: {error}"),
     }
     println!("cargo::rustc-env=LUCERNA_REVISION={}", git(&["rev-parse", "--short=12", "HEAD"]).unwrap_or_default());
