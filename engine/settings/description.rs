@@ -16,6 +16,8 @@ pub enum Kind {
     Number,
     /// One of some words.
     Choice(Vec<Choice>),
+    /// A time of day: hours and minutes, and seconds if wanted, `07:40` or `07:40:30`.
+    Clock,
     /// Text of a form that the docs of the key give.
     Text,
 }
@@ -208,7 +210,7 @@ impl Description {
             .map_err(|error| Error::new(ErrorKind::Runtime, "settings cannot be read back").caused_by(error))
     }
 
-    /// The JSON schema (draft 2020-12) of the settings, with `x-unit`, `x-decides`, `x-needs`, `x-option` and `x-zero`.
+    /// The JSON schema (draft 2020-12) of the settings, with `x-unit`, `x-decides`, `x-needs`, `x-option`, `x-kind` and `x-zero`.
     pub fn schema(&self) -> &Value {
         &self.schema
     }

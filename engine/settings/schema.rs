@@ -56,6 +56,9 @@ fn kind(field: &Value) -> Kind {
     if field["type"] == "string" && field["enum"].is_array() {
         return Kind::Choice(choices(field));
     }
+    if field["x-kind"] == "clock" {
+        return Kind::Clock;
+    }
     let types = [field["type"].as_str()].into_iter().flatten();
     let types = types.chain(field["type"].as_array().into_iter().flatten().filter_map(Value::as_str));
     let mut kinds = types.filter_map(|name| match name {

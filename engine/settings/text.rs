@@ -42,6 +42,7 @@ impl Key {
         match &self.kind {
             Kind::Switch => "true, false".to_owned(),
             Kind::Choice(all) => all.iter().map(|choice| choice.name.as_str()).collect::<Vec<_>>().join(", "),
+            Kind::Clock => "00:00 to 23:59".to_owned(),
             Kind::Text => String::new(),
             Kind::Whole | Kind::Number => match &self.allowed {
                 Allowed::All => String::new(),

@@ -61,7 +61,7 @@ fn option(key: &'static Key, heading: &'static str) -> Arg {
         Kind::Switch => PossibleValuesParser::new(["true", "false"]).into(),
         Kind::Whole => clap::value_parser!(u32).into(),
         Kind::Number => ValueParser::new(finite),
-        Kind::Text => ValueParser::string(),
+        Kind::Clock | Kind::Text => ValueParser::string(),
     };
     let help = paragraph(&key.doc);
     let help = match &key.default {

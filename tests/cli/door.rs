@@ -39,6 +39,15 @@ fn a_wrong_word_gets_the_right_one() {
 }
 
 #[test]
+fn a_command_that_prints_its_settings_needs_no_name_for_a_file() {
+    for (kind, key) in [("prt", "samples = "), ("daylight", "interval = ")] {
+        let printed = lucerna(["bake", kind, "--builtin", "parlour", "--print-config"]).expect(0, &[]).stdout;
+        assert!(printed.contains(key), "{kind}: {printed}");
+        lucerna(["bake", kind, "--builtin", "parlour"]).expect(2, &["--output"]);
+    }
+}
+
+#[test]
 fn completions_and_man_pages_cover_all_programs() {
     for shell in ["bash", "zsh", "fish"] {
         let text = lucerna(["completions", shell]).expect(0, &[]).stdout;

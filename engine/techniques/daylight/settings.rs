@@ -205,7 +205,7 @@ pub struct Settings {
     #[schemars(regex(pattern = r"^([0-9]{4}-[0-9]{2}-[0-9]{2})?$"))]
     pub date: String,
     /// Local time of the first frame: hours and minutes.
-    #[schemars(regex(pattern = r"^[0-2][0-9]:[0-5][0-9](:[0-5][0-9])?$"))]
+    #[schemars(regex(pattern = r"^[0-2][0-9]:[0-5][0-9](:[0-5][0-9])?$"), extend("x-kind" = "clock"))]
     pub time: String,
     /// Time between two frames.
     #[schemars(range(min = -1440, max = 1440), extend("x-unit" = "min"))]

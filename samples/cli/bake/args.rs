@@ -18,7 +18,15 @@ use crate::{
 #[derive(clap::Args, Clone, Debug)]
 pub struct BakeArgs {
     /// File to write
-    #[arg(short, long, value_name = "FILE", help_heading = "Output")]
+    // A command that only prints its settings writes no file.
+    #[arg(
+        short,
+        long,
+        value_name = "FILE",
+        required_unless_present = "print_config",
+        default_value_if("print_config", "true", "unused"),
+        help_heading = "Output"
+    )]
     pub output: PathBuf,
 
     /// Replace the file if it exists

@@ -111,6 +111,8 @@ pub struct Viewer {
     /// The pose of the scene in this frame of the window, with moved lamps.
     pub(super) pose: Option<Pose>,
     pub(super) held: Option<Held>,
+    /// The node of the lamp whose row in the panel the mouse is on.
+    pub(super) pointed_lamp: Option<usize>,
     pub(super) exposure: Option<f64>,
     pub(super) curve: Option<Operator>,
     pub(super) false_colour: bool,
@@ -136,6 +138,11 @@ pub struct Viewer {
 
 /// Time after a movement at which the still begins.
 const REST: Duration = Duration::from_millis(180);
+
+fn is_recent(change: Option<Instant>) -> bool {
+    change.is_some_and(|at| at.elapsed() < REST)
+}
+
 /// Time for which a message stands.
 const MESSAGE: Duration = Duration::from_secs(6);
 
@@ -185,6 +192,7 @@ impl Viewer {
             moved: BTreeMap::new(),
             pose: None,
             held: None,
+            pointed_lamp: None,
             exposure: args.exposure,
             curve: Some(screen::USUAL),
             false_colour: false,
@@ -230,7 +238,7 @@ impl Viewer {
     }
 
     fn is_moving(&self) -> bool {
-        self.playing || self.last_move.is_some_and(|at| at.elapsed() < REST)
+        self.playing || is_recent(self.last_move)
     }
 
     /// The camera in its place.
@@ -314,7 +322,7 @@ impl Viewer {
         if size.width < 8 || size.height < 8 {
             return;
         }
-        let moving = self.is_moving();
+        let all_move = self.is_moving();
         let (both, waits, look) = (self.shows_both(), self.waits(&stage), self.look());
         if !both {
             self.sides[1].rest();
@@ -343,7 +351,7 @@ impl Viewer {
                 pictures: side.pictures,
                 edges: side.has_edges(),
                 samples: side.samples,
-                moving,
+                moving: all_move || is_recent(side.last_change),
                 exposure,
                 look,
             };
@@ -356,7 +364,8 @@ impl Viewer {
     /// Compares the light of both sides.
     fn measure(&mut self) -> Result<()> {
         let (Some(a), Some(b)) = (self.sides[0].shown(), self.sides[1].shown()) else { return Ok(()) };
-        if a.size != b.size || self.is_moving() {
+        let changes = self.sides.iter().any(|side| is_recent(side.last_change));
+        if a.size != b.size || self.is_moving() || changes {
             return Ok(());
         }
         // A picture that has exposure and curve already is compared with pictures as the screen shows them.
@@ -402,11 +411,11 @@ impl Viewer {
                 self.say("the scene has no animation");
             }
         }
-        if let Some(at) = self.last_move {
-            let since = at.elapsed();
-            match REST.checked_sub(since) {
-                Some(left) => context.request_repaint_after(left + Duration::from_millis(5)),
-                None => self.last_move = None,
+        for last in [&mut self.last_move].into_iter().chain(self.sides.iter_mut().map(|side| &mut side.last_change)) {
+            match last.map(|at| REST.checked_sub(at.elapsed())) {
+                Some(Some(left)) => context.request_repaint_after(left + Duration::from_millis(5)),
+                Some(None) => *last = None,
+                None => (),
             }
         }
         if let Some((_, at)) = &self.message {
@@ -419,6 +428,7 @@ impl Viewer {
 
     /// Builds the user interface of a frame.
     pub fn frame(&mut self, context: &Context) {
+        self.pointed_lamp = None;
         if self.reading.is_none() && self.watch.as_ref().is_some_and(Watch::changed) {
             let args = self.newest_args();
             self.read(args);

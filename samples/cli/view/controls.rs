@@ -1,5 +1,7 @@
 //! The panel beside the picture: exposure, camera, lamps, and the settings of both sides.
 
+use std::time::Instant;
+
 use egui::{Context, RichText, Ui};
 use glam::{Mat4, Vec3};
 use lucerna::{
@@ -172,7 +174,7 @@ fn lamps(viewer: &mut Viewer, ui: &mut Ui) {
         let Some(pose) = viewer.pose.clone() else { return };
         for node in nodes {
             let world = pose.world[node];
-            ui.horizontal(|ui| {
+            let row = ui.horizontal(|ui| {
                 ui.add(egui::Label::new(lamps::name(&stage.scene, node)).truncate());
                 ui.with_layout(egui::Layout::right_to_left(egui::Align::Center), |ui| {
                     let back = egui::Button::new("⟲").small().frame(false);
@@ -193,6 +195,9 @@ fn lamps(viewer: &mut Viewer, ui: &mut Ui) {
                     }
                 });
             });
+            if row.response.contains_pointer() {
+                viewer.pointed_lamp = Some(node);
+            }
         }
     });
 }
@@ -242,6 +247,9 @@ fn side(viewer: &mut Viewer, number: usize, ui: &mut Ui) {
         let mut tree = (*side.settings).clone();
         if panel::show(ui, descriptions, &mut tree, &side.defaults) {
             side.settings = std::sync::Arc::new(tree);
+            if ui.input(|input| input.pointer.any_down()) {
+                side.last_change = Some(Instant::now());
+            }
         }
     });
 }

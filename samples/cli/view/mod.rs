@@ -8,6 +8,7 @@ mod bars;
 mod cameras;
 mod command;
 mod controls;
+mod fields;
 mod file;
 mod files;
 mod fly;

@@ -10,6 +10,7 @@ use lucerna::{
 };
 use serde_json::{Map, Value, json};
 
+use super::fields;
 use crate::effects;
 
 /// The descriptions of all groups of settings by their names.
@@ -159,9 +160,9 @@ fn edit(ui: &mut Ui, key: &Key, value: &mut Value) {
             });
         }
         Kind::Whole | Kind::Number => number(ui, key, value),
-        Kind::Text => {
-            let mut text = shown(value);
-            if ui.add(egui::TextEdit::singleline(&mut text).desired_width(110.0)).changed() {
+        Kind::Clock | Kind::Text => {
+            let field = if key.kind == Kind::Clock { fields::clock } else { fields::text };
+            if let Some(text) = field(ui, &key.name, &shown(value)) {
                 *value = json!(text);
             }
         }
@@ -173,6 +174,7 @@ fn first(key: &Key) -> Value {
     match (&key.kind, &key.allowed) {
         (Kind::Choice(choices), _) => choices.first().map_or(Value::Null, |choice| json!(choice.name)),
         (Kind::Switch, _) => json!(false),
+        (Kind::Clock, _) => json!("12:00"),
         (Kind::Text, _) => json!(""),
         (Kind::Whole, Allowed::Range { least, .. }) => json!(*least as i64),
         (Kind::Whole, Allowed::Listed(all)) => json!(all.first().copied().unwrap_or(0.0) as i64),

@@ -208,8 +208,9 @@ fn placed_lamps(viewer: &Viewer, rect: Rect, view: Option<&View>) -> Vec<(usize,
 fn rings(viewer: &Viewer, ui: &Ui, rect: Rect, view: Option<&View>) {
     let pointer = ui.input(|input| input.pointer.hover_pos());
     for (node, at) in placed_lamps(viewer, rect, view) {
-        let near = viewer.held == Some(Held::Lamp(node)) || pointer.is_some_and(|pointer| pointer.distance(at) < PICK);
-        // Only near the mouse: marks all over the picture would hide it.
+        let chosen = viewer.held == Some(Held::Lamp(node)) || viewer.pointed_lamp == Some(node);
+        let near = chosen || pointer.is_some_and(|pointer| pointer.distance(at) < PICK);
+        // Only near the mouse, or for a row of the panel: marks all over the picture would hide it.
         if near {
             let painter = ui.painter().with_clip_rect(rect);
             painter.circle_stroke(at, PICK - 3.0, Stroke::new(2.0, Color32::from_rgb(255, 210, 90)));

@@ -1,6 +1,6 @@
 //! One side of the window: what it shows, and the thread that renders it.
 
-use std::{path::PathBuf, sync::Arc};
+use std::{path::PathBuf, sync::Arc, time::Instant};
 
 use egui::{ColorImage, Context, TextureHandle, TextureOptions};
 use lucerna::{Result, gpu::GpuOptions};
@@ -33,6 +33,8 @@ pub struct Side {
     pub shows: Shows,
     /// Shown in the place of a technique.
     pub file: Option<FilePicture>,
+    /// When a person last dragged one of its settings: quick pictures for a moment.
+    pub last_change: Option<Instant>,
     session: Option<Session>,
     asked: Option<Wanted>,
     texture: Option<(u64, TextureHandle)>,
@@ -69,6 +71,7 @@ impl Side {
             samples: SAMPLES,
             shows: Shows::Picture,
             file: None,
+            last_change: None,
             session: None,
             asked: None,
             texture: None,
