@@ -379,15 +379,18 @@ impl Plan {
             projection[at] = clip_from_view[at];
         }
         let projection = Mat4::from_cols_array(&projection);
+        let help = |with: &str| {
+            format!("Render with {with}, bake this view, or bake the surfaces for all views (--kind atlas)")
+        };
         if view.extent != self.extent {
             let [width, height] = self.extent;
             let found = view.extent;
             let what = format!("the picture has {}×{} pixels, the bake {width}×{height}", found[0], found[1]);
-            return Err(Error::usage(what).help(format!("Render with --size {width}x{height}, or bake another view")));
+            return Err(Error::usage(what).help(help(&format!("--size {width}x{height}"))));
         }
         if !near(view.view_from_world, view_from_world) || !near(projection, clip_from_view) {
             let what = format!("the bake is for the camera `{camera}` alone, and this is another view");
-            return Err(Error::usage(what).help("Render with that camera, or bake this view"));
+            return Err(Error::usage(what).help(help("that camera")));
         }
         Ok(())
     }
