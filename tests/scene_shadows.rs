@@ -250,6 +250,31 @@ fn an_empty_room_has_no_shadow_on_its_walls() {
 }
 
 #[test]
+fn a_lamp_that_grazes_a_plane_leaves_no_stripes_of_its_own_shadow() {
+    // The filter reaches two texels from the receiver, where the plane is nearer to the lamp by up to twenty times as much. A corner of the
+    // filter reaches farther, where the plane falls along the diagonal of the map.
+    for (turn, least) in [(Quat::IDENTITY, 0.999), (Quat::from_rotation_y(PI / 4.0) * Quat::from_rotation_x(0.6), 0.95)]
+    {
+        let mut scene = Scene::default();
+        let ground = mesh(&mut scene, square(), Material::diffuse("", Vec3::ONE));
+        place(&mut scene, ground, Mat4::from_quat(turn) * Mat4::from_scale(Vec3::splat(20.0)));
+        light(&mut scene, LightKind::Point { range: None }, Mat4::from_translation(turn * Vec3::Y));
+        let points: Vec<(Vec3, Vec3)> = (0..3600)
+            .map(|i| Vec3::new((i % 60) as f32 * 0.631 - 18.7, 0.0, (i / 60) as f32 * 0.627 - 18.3))
+            .map(|point| (turn * point, turn * Vec3::Y))
+            .collect();
+        with_gpu(|gpu| {
+            for kind in [Kind::Plain, Kind::Pcf] {
+                let settings = Settings { kind, ..Settings::default() };
+                for ((point, _), factor) in points.iter().zip(factors(gpu, &scene, &settings, &points)) {
+                    assert!(factor > least, "{kind:?} at {point}: {factor}");
+                }
+            }
+        });
+    }
+}
+
+#[test]
 fn without_shadows_everything_is_lit_and_late_lights_are_named() {
     let mut scene = square_over_plane(Material::diffuse("", Vec3::ONE));
     for _ in 0..11 {

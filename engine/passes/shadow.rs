@@ -68,7 +68,8 @@ pub struct Settings {
     /// Offset of the receiver towards the light before the comparison.
     #[schemars(range(min = 0, max = 1000), extend("x-unit" = "texels", "x-needs" = {"kind": {"enum": ["plain", "pcf"]}}))]
     pub depth_bias: f32,
-    /// Offset of the receiver along its normal at grazing angles.
+    /// Offset of the receiver along its normal at grazing angles. The default is the reach of the filter of `pcf`: with less, surfaces that a
+    /// lamp grazes have stripes of their own shadow.
     #[schemars(range(min = 0, max = 1000), extend("x-unit" = "texels", "x-needs" = {"kind": {"not": {"const": "off"}}}))]
     pub normal_bias: f32,
     /// Reach of a filter over the picture that smooths the shadows of the first 16 lights, to each side. It stops at steps of about a
@@ -92,7 +93,7 @@ impl Default for Settings {
             grazing: 0.5,
             blur: 1.5,
             depth_bias: 1.0,
-            normal_bias: 1.5,
+            normal_bias: 2.0,
             screen_blur: 0,
         }
     }
