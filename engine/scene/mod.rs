@@ -24,6 +24,7 @@ mod obj;
 mod surface;
 pub(crate) mod surfaces;
 mod tangents;
+pub mod terrain;
 pub mod texture;
 mod validate;
 pub mod view;

@@ -14,6 +14,7 @@ use std::{
     panic::{AssertUnwindSafe, catch_unwind},
 };
 
+use glam::{UVec2, uvec2};
 use image::{DynamicImage, ImageDecoder, ImageFormat, ImageReader};
 
 use super::{Limits, Texture};
@@ -108,12 +109,38 @@ impl Format {
 
 /// Turns a panic inside a decoder of others into an error. Sizes are checked before; this is the last resort against
 /// an index or an overflow that their authors missed: one damaged texture must not end the process.
-fn guarded(format: &str, decode: impl FnOnce() -> Result<Texture>) -> Result<Texture> {
+fn guarded<T>(format: &str, decode: impl FnOnce() -> Result<T>) -> Result<T> {
     catch_unwind(AssertUnwindSafe(decode))
         .unwrap_or_else(|_| Err(Error::input(format!("damaged: the {format} decoder gave up"))))
 }
 
+/// The luma codes of a picture as 16 bits, top row first, and whether it has colours. `None`: its format has more than 16 bits, or blocks.
+pub(super) fn luma(bytes: &[u8], limits: &Limits) -> Result<Option<(UVec2, Vec<u16>, bool)>> {
+    let (format, name) = match Format::sniff(bytes) {
+        Some(Format::Png) => (ImageFormat::Png, "PNG"),
+        Some(Format::Jpeg) => (ImageFormat::Jpeg, "JPEG"),
+        Some(Format::WebP) => (ImageFormat::WebP, "WebP"),
+        Some(Format::Bmp) => (ImageFormat::Bmp, "BMP"),
+        Some(Format::Tga) => (ImageFormat::Tga, "TGA"),
+        Some(Format::Dds | Format::Ktx2) | None => return Ok(None),
+    };
+    guarded(name, || {
+        let picture = plain(bytes, format, name, limits, 8)?;
+        let color = picture.color().has_color();
+        let codes = picture.into_luma16();
+        Ok(Some((uvec2(codes.width(), codes.height()), codes.into_raw(), color)))
+    })
+}
+
 fn decode_plain(bytes: &[u8], format: ImageFormat, name: &str, limits: &Limits) -> Result<Texture> {
+    // The decoded samples and the RGBA texels stand side by side for a moment.
+    let rgba = plain(bytes, format, name, limits, 4)?.into_rgba8();
+    let (width, height) = rgba.dimensions();
+    Ok(Texture { name: String::new(), width, height, rgba: rgba.into_raw().as_chunks::<4>().0.to_vec() })
+}
+
+/// Decodes a picture that takes `further` bytes a texel besides the samples.
+fn plain(bytes: &[u8], format: ImageFormat, name: &str, limits: &Limits, further: u64) -> Result<DynamicImage> {
     let damaged = |error| match error {
         image::ImageError::Limits(limit) => Error::input(format!("{name} over the limits")).caused_by(limit),
         error => Error::input(format!("{name} decoding failed")).caused_by(error),
@@ -124,11 +151,9 @@ fn decode_plain(bytes: &[u8], format: ImageFormat, name: &str, limits: &Limits) 
     reader.limits(decoder_limits);
     let decoder = reader.into_decoder().map_err(damaged)?;
     let (width, height) = decoder.dimensions();
-    // The decoded samples and the RGBA texels stand side by side for a moment.
-    let per_texel = 4 + u64::from(decoder.color_type().bytes_per_pixel());
+    let per_texel = further + u64::from(decoder.color_type().bytes_per_pixel());
     check_size(width.into(), height.into(), per_texel, limits)?;
-    let rgba = DynamicImage::from_decoder(decoder).map_err(damaged)?.into_rgba8();
-    Ok(Texture { name: String::new(), width, height, rgba: rgba.into_raw().as_chunks::<4>().0.to_vec() })
+    DynamicImage::from_decoder(decoder).map_err(damaged)
 }
 
 /// `count` texels to fill, or an error where `vec!` would abort.

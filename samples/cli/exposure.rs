@@ -16,7 +16,7 @@ const TARGET: f32 = 0.2;
 pub fn of_source(source: &Source) -> Option<f64> {
     match source {
         Source::Builtin(name) => builtin::exposure(name).map(f64::from),
-        Source::File(_) => None,
+        Source::File(_) | Source::Terrain => None,
     }
 }
 

@@ -55,6 +55,7 @@ pub mod signals;
 pub mod smooth;
 pub mod source;
 pub mod stage;
+pub mod terrain;
 pub mod timings;
 pub mod tonemap;
 pub mod view;

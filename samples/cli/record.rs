@@ -23,6 +23,7 @@ use crate::{
     smooth::{MOST, Smooth},
     source::{self, SceneArgs},
     stage::{Eye, Stage, StageArgs},
+    terrain::Terrain,
 };
 
 /// The `config` of a picture's metadata.
@@ -40,6 +41,9 @@ pub struct Record {
     /// The added objects.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub add: Vec<Added>,
+    /// The land around the scene.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub terrain: Option<Terrain>,
     /// The changed materials.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub set: Vec<Change>,
@@ -134,6 +138,8 @@ impl BakeFile {
 pub enum Source {
     File(String),
     Builtin(String),
+    /// Nothing but the terrain.
+    Terrain,
 }
 
 /// The camera.
@@ -154,6 +160,7 @@ impl Record {
             unit: args.scene.unit,
             ground: args.scene.ground.ground.then(|| args.scene.ground.options.clone()),
             add: args.scene.add.clone(),
+            terrain: args.scene.terrain.clone(),
             set: args.scene.set.clone(),
             fingerprint: stage.fingerprint.clone(),
             width: args.size.width,
@@ -235,10 +242,19 @@ impl Record {
         let (scene, builtin) = match &self.scene {
             Source::File(path) => (Some(PathBuf::from(path)), None),
             Source::Builtin(name) => (None, Some(name.clone())),
+            Source::Terrain => (None, None),
         };
         let ground = GroundArgs { ground: self.ground.is_some(), options: self.ground.clone().unwrap_or_default() };
         Ok(StageArgs {
-            scene: SceneArgs { scene, builtin, unit: self.unit, add: self.add.clone(), set: self.set.clone(), ground },
+            scene: SceneArgs {
+                scene,
+                builtin,
+                unit: self.unit,
+                add: self.add.clone(),
+                set: self.set.clone(),
+                terrain: self.terrain.clone(),
+                ground,
+            },
             size: Size { width: self.width, height: self.height },
             camera: None,
             time: self.time,
@@ -318,6 +334,7 @@ impl Record {
                 .filter_map(Added::file)
                 .map(|path| format!("{path:?}, and the files in its folder that it refers to")),
         );
+        list.extend(self.terrain.iter().map(|terrain| format!("{:?}", terrain.file())));
         let pipeline = self.settings.get(effects::GROUP).and_then(|group| group.get("pipeline")?.as_str());
         list.extend(pipeline.map(|path| format!("{path:?}, and the shaders in its folder that it refers to")));
         let environment = self.environment.as_deref().map(Path::new);
@@ -355,6 +372,7 @@ mod tests {
             unit: Some(0.01),
             ground: Some(GroundOptions { copies: Some(3), sunk: Some(-0.2), ..GroundOptions::default() }),
             add: vec!["pot.glb@0,1,2".parse().unwrap()],
+            terrain: Some("hills.png@20,3".parse().unwrap()),
             set: vec!["wall.albedo=0.5,0.25,1".parse().unwrap()],
             turn: Some(-30.5),
             put: vec!["0=1,2,3".parse().unwrap()],
@@ -404,7 +422,11 @@ mod tests {
         assert!(args.output.is_empty() && args.dump.is_none() && args.timings.is_none() && args.stage.camera.is_none());
         assert!(args.settings.file.is_none() && !args.overwrite && !args.json);
         let with_folder = |name: &str| format!("{name:?}, and the files in its folder that it refers to");
-        assert_eq!(again.files(), [with_folder("-odd.obj"), with_folder("pot.glb"), "\"-odd.day\"".to_owned()]);
+        assert_eq!(
+            again.files(),
+            [with_folder("-odd.obj"), with_folder("pot.glb"), "\"hills.png\"".to_owned(), "\"-odd.day\"".to_owned()]
+        );
+        assert_eq!(args.stage.scene.terrain, again.terrain);
         assert_eq!((args.stage.scene.add, args.stage.scene.set), (again.add.clone(), again.set.clone()));
         for (odd, place) in [
             (Record { width: 0, ..record.clone() }, "width"),

@@ -15,9 +15,10 @@ use crate::{
     config::nearest,
     ground::GroundArgs,
     record::Source,
+    terrain::Terrain,
 };
 
-/// The options `SCENE`, `--builtin NAME`, `--unit`, `--add`, `--set`, and those of `--ground`.
+/// The options `SCENE`, `--builtin NAME`, `--unit`, `--add`, `--set`, `--terrain`, and those of `--ground`.
 #[derive(clap::Args, Clone, Debug, Default)]
 pub struct SceneArgs {
     /// Scene file: .gltf, .glb or .obj, also inside a .zip
@@ -42,6 +43,11 @@ pub struct SceneArgs {
     #[arg(long, value_name = "MATERIAL.albedo=R,G,B")]
     pub set: Vec<Change>,
 
+    /// Land from a height map: a picture whose values are heights. WIDTH of the longer edge, HEIGHT of the whole range, largest ERROR, and place of the
+    /// middle, metres [default: 1 m a pixel, a tenth of WIDTH, a thousandth of HEIGHT, 0,0,0]
+    #[arg(long, value_name = "FILE[@WIDTH[,HEIGHT[,ERROR[,X,Y,Z]]]]", conflicts_with = "ground")]
+    pub terrain: Option<Terrain>,
+
     #[command(flatten)]
     pub ground: GroundArgs,
 }
@@ -60,9 +66,19 @@ impl SceneArgs {
     /// Reads the scene without the added objects.
     ///
     /// # Errors
-    /// As [`open`] and [`GroundArgs::place`].
+    /// As [`open`], [`Terrain::add`] and [`GroundArgs::place`].
     pub fn open_alone(&self) -> Result<(Scene, Source)> {
-        let (mut scene, source) = open(self.scene.as_deref(), self.builtin.as_deref(), &in_unit(self.unit))?;
+        let (mut scene, source) = match (&self.terrain, &self.scene, &self.builtin) {
+            // Land without anything on it.
+            (Some(terrain), None, None) => {
+                let name = terrain.file().file_stem().map(|stem| stem.to_string_lossy().into_owned());
+                (Scene { name: name.unwrap_or_default(), ..Scene::default() }, Source::Terrain)
+            }
+            (_, file, name) => open(file.as_deref(), name.as_deref(), &in_unit(self.unit))?,
+        };
+        if let Some(terrain) = &self.terrain {
+            terrain.add(&mut scene)?;
+        }
         changed::all(&mut scene, &self.set)?;
         Ok((self.ground.place(scene, self.unit)?, source))
     }

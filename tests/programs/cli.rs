@@ -65,6 +65,8 @@ mod render;
 mod rerun;
 #[path = "../cli/smooth.rs"]
 mod smooth;
+#[path = "../cli/terrain.rs"]
+mod terrain;
 #[path = "../cli/tonemap.rs"]
 mod tonemap;
 #[path = "../cli/tonemap_light.rs"]

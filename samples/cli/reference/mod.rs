@@ -220,7 +220,7 @@ fn picture(
         show(args.show, &mut layers);
         let suits = match &stage.source {
             Source::Builtin(name) => builtin::exposure(name).map(f64::from),
-            Source::File(_) => None,
+            Source::File(_) | Source::Terrain => None,
         };
         let fitting = || suits.unwrap_or_else(|| exposure::fitting(&layers));
         // A normalised picture needs no automatic exposure.

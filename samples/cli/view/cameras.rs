@@ -56,8 +56,11 @@ impl Cameras {
     /// # Errors
     /// `Output` if it cannot be written.
     pub fn write(&mut self, scene: &Source) -> Result<PathBuf> {
-        let (Source::File(name) | Source::Builtin(name)) = scene;
-        let list = ViewList { scene: name.clone(), seed: 0, views: self.list.clone() };
+        let name = match scene {
+            Source::File(name) | Source::Builtin(name) => name.as_str(),
+            Source::Terrain => "terrain",
+        };
+        let list = ViewList { scene: name.to_owned(), seed: 0, views: self.list.clone() };
         let text = toml::to_string(&list)
             .map_err(|error| Error::new(ErrorKind::Runtime, "the cameras are not TOML").caused_by(error))?;
         let stem =

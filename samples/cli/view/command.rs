@@ -129,6 +129,10 @@ fn scene(common: &Common<'_>, technique: &str, say: &mut impl FnMut(&[&str])) {
     match common.source {
         Source::File(file) => say(&[file]),
         Source::Builtin(name) => say(&["--builtin", name]),
+        Source::Terrain => (),
+    }
+    if let Some(terrain) = &scene.terrain {
+        say(&["--terrain", &terrain.to_string()]);
     }
     if let Some(unit) = scene.unit {
         say(&["--unit", &unit.to_string()]);

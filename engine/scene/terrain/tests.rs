@@ -1,0 +1,156 @@
+use std::collections::HashMap;
+
+use super::*;
+
+fn map(size: UVec2, value: impl Fn(f32, f32) -> f32) -> HeightMap {
+    let at = |i: u32| value((i % size.x) as f32 / (size.x - 1) as f32, (i / size.x) as f32 / (size.y - 1) as f32);
+    HeightMap { size, values: (0..size.x * size.y).map(at).collect() }
+}
+
+fn hills(x: f32, y: f32) -> f32 {
+    0.5 + 0.3 * (7.0 * x).sin() * (5.0 * y + 1.0).cos() + 0.2 * (-40.0 * ((x - 0.7).powi(2) + (y - 0.3).powi(2))).exp()
+}
+
+fn mesh(map: &HeightMap, terrain: &Terrain) -> Primitive {
+    let mut scene = Scene::default();
+    add(&mut scene, map, terrain, &Limits::default()).unwrap();
+    scene.validate().unwrap();
+    assert_eq!((scene.nodes[0].name.as_str(), scene.materials[0].name.as_str()), (NAME, NAME));
+    scene.meshes.remove(0).primitives.remove(0)
+}
+
+/// Corners of each triangle.
+fn triangles(mesh: &Primitive) -> Vec<[Vec3; 3]> {
+    mesh.indices.chunks_exact(3).map(|c| [0, 1, 2].map(|k| mesh.positions[c[k] as usize])).collect()
+}
+
+#[test]
+fn the_surface_is_within_its_error_of_every_sample_and_has_no_cracks() {
+    let map = map(uvec2(65, 65), hills);
+    let mut before = usize::MAX;
+    for error in [0.02, 0.1, 0.5, 2.0] {
+        let terrain = Terrain { width: 64.0, height: 20.0, error, middle: Vec3::new(5.0, 1.0, -3.0) };
+        let mesh = mesh(&map, &terrain);
+        let all = triangles(&mesh);
+        // Fewer triangles for a larger error, and all of the map is covered once.
+        assert!(all.len() < before, "{error}: {}", all.len());
+        before = all.len();
+        let area: f32 = all.iter().map(|[a, b, c]| 0.5 * (*b - *a).cross(*c - *a).y).sum();
+        assert!((area - 64.0 * 64.0).abs() < 0.1, "{area}");
+        assert!(all.iter().all(|[a, b, c]| (*b - *a).cross(*c - *a).y > 0.0), "all triangles face upwards");
+        // Each side is that of one more triangle, in the other direction, or lies on the rim.
+        let mut sides = HashMap::new();
+        for c in mesh.indices.chunks_exact(3) {
+            for k in 0..3 {
+                *sides.entry((c[k], c[(k + 1) % 3])).or_insert(0) += 1;
+            }
+        }
+        for (&(a, b), &count) in &sides {
+            let [p, q] = [a, b].map(|i| mesh.positions[i as usize] - terrain.middle);
+            let rim = [p.x, p.z].iter().zip([q.x, q.z]).any(|(p, q)| p.abs() == 32.0 && *p == q);
+            assert!(count == 1 && (rim || sides.contains_key(&(b, a))), "{p} {q}");
+        }
+        let worst = (0..65 * 65)
+            .map(|i| {
+                let at = terrain.middle + Vec3::new((i % 65) as f32 - 32.0, 0.0, (i / 65) as f32 - 32.0);
+                (height_at(&all, at) - (terrain.middle.y + 20.0 * map.values[i])).abs()
+            })
+            .fold(0.0, f32::max);
+        assert!(worst <= 1.001 * error, "{error}: {worst}");
+        assert!(worst > 0.1 * error, "the bound is near the error: {error}: {worst}");
+    }
+}
+
+/// Height of the surface over a place.
+fn height_at(all: &[[Vec3; 3]], at: Vec3) -> f32 {
+    let inside = |[a, b, c]: &[Vec3; 3]| {
+        let side = |p: Vec3, q: Vec3| (q - p).cross(at - p).y;
+        let [u, v, w] = [side(*b, *c), side(*c, *a), side(*a, *b)];
+        let all = u + v + w;
+        (u.min(v).min(w) >= -1e-3).then(|| (u * a.y + v * b.y + w * c.y) / all)
+    };
+    all.iter().find_map(inside).unwrap()
+}
+
+#[test]
+fn a_plane_takes_two_triangles_and_a_step_takes_many() {
+    let plane = map(uvec2(33, 17), |x, y| 0.25 * x + 0.5 * y);
+    let terrain = Terrain { width: 32.0, height: 8.0, error: 1e-4, middle: Vec3::ZERO };
+    let flat = mesh(&plane, &terrain);
+    assert_eq!(flat.indices.len(), 6);
+    // The longer edge has the width; the top of the picture lies at −Z.
+    let span = |of: fn(&Vec3) -> f32| flat.positions.iter().map(of).fold(f32::MIN, f32::max);
+    assert_eq!([span(|p| p.x), span(|p| p.z), span(|p| p.y)], [16.0, 8.0, 6.0]);
+    let near = flat.positions.iter().find(|p| p.x < 0.0 && p.z > 0.0).unwrap();
+    assert!((near.y - 4.0).abs() < 1e-5);
+    let normal = Vec3::new(-2.0 / 32.0, 1.0, -4.0 / 16.0).normalize();
+    assert!(flat.normals.iter().all(|n| (*n - normal).length() < 1e-4), "{:?}", flat.normals);
+    let step = map(uvec2(33, 33), |x, _| if x > 0.4 { 1.0 } else { 0.0 });
+    let many = mesh(&step, &terrain).indices.len() / 3;
+    assert!((64..1200).contains(&many), "{many}");
+}
+
+#[test]
+fn sizes_that_are_no_powers_of_two_keep_their_heights() {
+    let odd = map(uvec2(50, 23), hills);
+    let terrain = Terrain { width: 49.0, height: 10.0, error: 0.0, middle: Vec3::ZERO };
+    let all = triangles(&mesh(&odd, &terrain));
+    for i in (0..50 * 23).step_by(7) {
+        let at = Vec3::new((i % 50) as f32 - 24.5, 0.0, (i / 50) as f32 - 11.0) * 0.9999;
+        let off = (height_at(&all, at) - 10.0 * odd.values[i]).abs();
+        assert!(off < 0.15, "{at}: {off}");
+    }
+}
+
+#[test]
+fn numbers_out_of_range_are_refused_and_named() {
+    let map = map(uvec2(3, 3), hills);
+    let usual = Terrain::of(&map);
+    for (terrain, name) in [
+        (Terrain { width: 0.0, ..usual }, "the width"),
+        (Terrain { height: f32::NAN, ..usual }, "the height"),
+        (Terrain { error: -1.0, ..usual }, "the error"),
+        (Terrain { middle: Vec3::INFINITY, ..usual }, "the middle"),
+    ] {
+        let error = add(&mut Scene::default(), &map, &terrain, &Limits::default()).unwrap_err();
+        assert!(error.exit_code() == 2 && error.to_string().contains(name), "{error}");
+    }
+    let few = Limits { max_vertices: 9, ..Limits::default() };
+    let error = add(&mut Scene::default(), &map, &Terrain { error: 0.0, ..usual }, &few).unwrap_err();
+    assert!(error.to_string().contains("Allow a larger error"), "{error}");
+}
+
+fn png(width: u32, height: u32, color: png::ColorType, depth: png::BitDepth, bytes: &[u8]) -> Vec<u8> {
+    let mut file = Vec::new();
+    let mut encoder = png::Encoder::new(&mut file, width, height);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.write_header().unwrap().write_image_data(bytes).unwrap();
+    file
+}
+
+#[test]
+fn pictures_are_read_with_all_their_bits() {
+    let read = |bytes: &[u8]| HeightMap::decode(bytes, &Limits::default());
+    let deep: Vec<u8> = [0u16, 1, 257, 65535].iter().flat_map(|code| code.to_be_bytes()).collect();
+    let (found, notes) = read(&png(2, 2, png::ColorType::Grayscale, png::BitDepth::Sixteen, &deep)).unwrap();
+    assert!(notes.is_empty());
+    assert_eq!(found.values, [0.0, 1.0 / 65535.0, 257.0 / 65535.0, 1.0]);
+    let (found, _) = read(&png(2, 2, png::ColorType::Grayscale, png::BitDepth::Eight, &[0, 1, 128, 255])).unwrap();
+    assert_eq!(found.values, [0.0, 1.0 / 255.0, 128.0 / 255.0, 1.0]);
+    let (_, notes) = read(&png(2, 2, png::ColorType::Rgb, png::BitDepth::Eight, &[9; 12])).unwrap();
+    assert!(notes[0].text.contains("luma"), "{}", notes[0].text);
+    // Floating-point numbers are as they are.
+    let mut pfm = b"Pf\n2 2\n-1.0\n".to_vec();
+    pfm.extend([3.0f32, -4.0, 1.0, 2.0].iter().flat_map(|value| value.to_le_bytes()));
+    assert_eq!(read(&pfm).unwrap().0.values, [1.0, 2.0, 3.0, -4.0]);
+    let last = pfm.len() - 4;
+    pfm[last..].copy_from_slice(&f32::NAN.to_le_bytes());
+    assert!(read(&pfm).unwrap_err().to_string().contains("no finite number"));
+    let error = read(&png(1, 4, png::ColorType::Grayscale, png::BitDepth::Eight, &[0; 4])).unwrap_err();
+    assert!(error.to_string().contains("at least two rows"), "{error}");
+    assert_eq!(read(b"not a picture").unwrap_err().exit_code(), 3);
+    assert!(
+        HeightMap::read(Path::new("no/such.png"), &Limits::default()).unwrap_err().to_string().contains("no/such.png")
+    );
+}
