@@ -40,7 +40,12 @@ fn composing_is_equations_27_to_29() {
         let direct: Vec<[f32; 4]> = (0..width * height).map(|_| random.texel()).collect();
         for (plane, tint, occlude_ambient) in [(false, false, false), (true, true, true)] {
             let mut graph = Graph::new("compose");
-            let g = gbuffer(&mut graph, &eye, &fine);
+            let mut g = gbuffer(&mut graph, &eye, &fine);
+            // Every third pixel is as bright as a metal beyond a dielectric's 4 %.
+            let mirror = |i: usize| if i % 3 == 0 { dvec3(0.8, 0.5, 0.25) } else { DVec3::ZERO };
+            let specular: Vec<[f32; 4]> =
+                (0..width * height).map(|i| (mirror(i) + 0.04).as_vec3().extend(1.0).to_array()).collect();
+            g.specular = image(&mut graph, "specular", Extent::new(16, 8), &specular);
             let ambient = Irradiance::constant(Vec3::splat(if tint { 0.4 } else { 0.0 })).upload(&mut graph);
             let coarse_extent = Extent::new(cw as u32, ch as u32);
             let depth: Vec<_> = coarse_depth.iter().map(|z| [*z; 4]).collect();
@@ -82,8 +87,9 @@ fn composing_is_equations_27_to_29() {
                     let accessible = 1.0 - channel(3).clamp(0.0, 1.0);
                     let direct = dvec3(direct[i][0].into(), direct[i][1].into(), direct[i][2].into());
                     let expected = if tint {
-                        let around = fine.albedo[i] * 0.4 * (accessible + 1.0 - 0.6).clamp(0.0, 1.0);
-                        direct + around + light * fine.albedo[i] * 0.7
+                        let reflected = fine.albedo[i] + mirror(i);
+                        let around = reflected * 0.4 * (accessible + 1.0 - 0.6).clamp(0.0, 1.0);
+                        direct + around + light * reflected * 0.7
                     } else {
                         cpu::sum(direct, accessible, light, 0.6, 0.7)
                     };

@@ -125,21 +125,24 @@ void main() {
     vec4 coarse = light_around.gathered;
     float open = 1.0 - clamp(coarse.a, 0.0, 1.0);
     float lit = clamp(open + 1.0 - k_ssao, 0.0, 1.0);
-    vec3 bounced = k_isr * coarse.rgb * (TINT != 0 ? color.rgb : vec3(1.0));
+    vec4 gloss = texelFetch(specular, pixel, 0);
+    // Metals have no diffuse part and would be black. What they reflect beyond a dielectric's 4 % takes light of surfaces and lamps as if it came
+    // evenly from all sides of the surface.
+    vec3 mirror = max(gloss.rgb - 0.04, 0.0);
+    vec3 reflected = color.rgb + mirror;
+    vec3 bounced = k_isr * coarse.rgb * (TINT != 0 ? reflected : vec3(1.0));
     vec4 own = texelFetch(emission, pixel, 0);
     vec3 glow = own.rgb;
     // The occlusion texture of the material darkens light from all around and nothing else.
     vec3 around = color.rgb * ambient_irradiance(n);
-    // Metals have no diffuse part and would be black: what they reflect beyond a dielectric's 4 % takes the environment as
-    // blurred as its irradiance, from the mirrored direction.
-    vec4 gloss = texelFetch(specular, pixel, 0);
+    // The environment is as blurred as its irradiance for them, from the mirrored direction.
     vec3 mirrored = normalize(mix(reflect(-to_camera(view, p), n), n, gloss.a * gloss.a));
-    around += max(gloss.rgb - 0.04, 0.0) * ambient_irradiance(mirrored);
+    around += mirror * ambient_irradiance(mirrored);
     around *= own.a / 3.14159265358979;
     vec3 direct_part = OCCLUDE_AMBIENT != 0 ? light.rgb : (light.rgb - glow) * lit + glow;
     vec4 share = light_around.sky;
     around *= AREA != 0 ? share.rgb / max(share.a, 1e-6) : vec3(lit);
-    bounced += AREA != 0 ? color.rgb * light_around.lamps : vec3(0.0);
+    bounced += AREA != 0 ? reflected * light_around.lamps : vec3(0.0);
     vec3 sum = direct_part + around + bounced; // [ISR 29]
     imageStore(total, pixel, vec4(sum, 1.0));
     imageStore(indirect, pixel, vec4(around + bounced, 1.0));
