@@ -32,6 +32,7 @@ pub mod lights;
 pub mod listed;
 pub mod notes;
 pub mod outputs;
+pub mod path;
 pub mod pattern;
 pub mod piped;
 mod placed;

@@ -17,6 +17,7 @@ use crate::{
     ground::{GroundArgs, GroundOptions},
     lamps::Lamp,
     lights::{Point, Sun},
+    path::CameraPath,
     progress::ProgressMode,
     render::Again,
     screen::{self, ScreenArgs},
@@ -149,6 +150,8 @@ pub enum View {
     /// Index into the scene's cameras.
     Scene(usize),
     File(CameraFile),
+    /// A flight, with all its views.
+    Path(CameraPath),
 }
 
 impl Record {
@@ -239,6 +242,9 @@ impl Record {
         if let View::File(camera) = &self.camera {
             camera.check().map_err(|what| Error::input(what).at("camera"))?;
         }
+        if let View::Path(path) = &self.camera {
+            path.check().map_err(|what| Error::input(what).at("camera"))?;
+        }
         let (scene, builtin) = match &self.scene {
             Source::File(path) => (Some(PathBuf::from(path)), None),
             Source::Builtin(name) => (None, Some(name.clone())),
@@ -257,6 +263,7 @@ impl Record {
             },
             size: Size { width: self.width, height: self.height },
             camera: None,
+            camera_path: None,
             time: self.time,
             environment: self.environment.as_ref().map(PathBuf::from),
             turn: self.turn,

@@ -18,6 +18,7 @@ use crate::{
     fingerprint, framing,
     lamps::{self, Lamp},
     lights::{self, Point, Sun},
+    path::{self, CameraPath},
     placed::Placed,
     record::{self, Source},
     source::{self, SceneArgs},
@@ -56,6 +57,11 @@ pub struct StageArgs {
     /// X,Y,Z,X,Y,Z in metres, then, if wanted, the vertical angle of view in degrees and the near plane in metres; default: the scene's first camera
     #[arg(long, value_name = "NAME|INDEX|FILE|NUMBERS", allow_hyphen_values = true, help_heading = "Picture")]
     pub camera: Option<String>,
+
+    /// Fly the camera through the views of a list (`lucerna views`, or kept in the window): from each to the next in SECONDS [default: 2]; time 0 is
+    /// the first view. With --frames
+    #[arg(long, value_name = "LIST.toml[,SECONDS]", conflicts_with = "camera", help_heading = "Picture")]
+    pub camera_path: Option<path::Named>,
 
     /// Time of an animated scene, seconds; in a sequence the time of frame 0
     #[arg(long, value_name = "S", default_value_t = 0.0, value_parser = finite, allow_negative_numbers = true, help_heading = "Picture")]
@@ -138,34 +144,17 @@ impl Stage {
             })
         };
         let from_file = match &args.eye {
-            Some(eye) => matches!(eye.view, record::View::File(_)),
-            None => named_file(),
+            Some(eye) => matches!(eye.view, record::View::File(_) | record::View::Path(_)),
+            None => args.camera_path.is_some() || named_file(),
         };
         let cameras = scene.cameras.len();
         if !from_file {
             framing::add_missing_camera(&mut scene, args.size.aspect());
         }
         let added_camera = scene.cameras.len() > cameras;
-        let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
-        let choice = match (&args.eye, &args.camera) {
-            (Some(Eye { view: record::View::File(file), .. }), _) => Choice::File(file.clone()),
-            // An index from a record must not be interpreted as a file name.
-            (Some(Eye { view: record::View::Scene(index), .. }), _) => camera::choose(&index.to_string(), &names)?,
-            (None, Some(asked)) => camera::choose(asked, &names)?,
-            (None, None) => Choice::Scene(first_placed(&scene)),
-        };
-        let (placed, eye) = match choice {
-            Choice::Scene(index) => (Placed::of_scene(&scene, index), record::View::Scene(index)),
-            Choice::File(file) => {
-                let name = match &args.eye {
-                    Some(eye) => eye.name.clone(),
-                    None => name_of(args.camera.as_deref().unwrap_or_default()),
-                };
-                (Placed::from_file(name, &file), record::View::File(file))
-            }
-        };
+        let (placed, eye) = camera(args, &scene)?;
         let pose = Pose::playing(&scene, args.time as f32);
-        let view = placed.view(&pose, args.size);
+        let view = placed.at(args.time).view(&pose, args.size);
         let lights = scene.lights.len();
         default_light::add_missing_light(&mut scene, args.default_light, Some((&pose, &view)));
         let default_light = scene.lights.len() > lights;
@@ -202,11 +191,39 @@ impl Stage {
             pose.world[*node] = *world;
         }
         self.extents.check(&self.scene, &pose)?;
-        let view = self.placed.view(&pose, size);
+        let view = self.placed.at(seconds).view(&pose, size);
         extent::near(view.position.abs().max_element())
             .map_err(|error| error.at(format!("camera '{}'", self.placed.name)))?;
         Ok((pose, view))
     }
+}
+
+/// The camera in its place, and how a record names it.
+fn camera(args: &StageArgs, scene: &Scene) -> Result<(Placed, record::View)> {
+    let flight = |name: String, path: CameraPath| (Placed::on_path(name, path.clone()), record::View::Path(path));
+    let names: Vec<&str> = scene.cameras.iter().map(|camera| camera.name.as_str()).collect();
+    let choice = match (&args.eye, &args.camera, &args.camera_path) {
+        (Some(Eye { view: record::View::File(file), .. }), ..) => Choice::File(file.clone()),
+        (Some(Eye { view: record::View::Path(path), name }), ..) => return Ok(flight(name.clone(), path.clone())),
+        // An index from a record must not be interpreted as a file name.
+        (Some(Eye { view: record::View::Scene(index), .. }), ..) => camera::choose(&index.to_string(), &names)?,
+        (None, Some(asked), _) => camera::choose(asked, &names)?,
+        (None, None, Some(path)) => {
+            let read = path.read().map_err(|error| error.at("--camera-path"))?;
+            return Ok(flight(name_of(&path.list), read));
+        }
+        (None, None, None) => Choice::Scene(first_placed(scene)),
+    };
+    Ok(match choice {
+        Choice::Scene(index) => (Placed::of_scene(scene, index), record::View::Scene(index)),
+        Choice::File(file) => {
+            let name = match &args.eye {
+                Some(eye) => eye.name.clone(),
+                None => name_of(args.camera.as_deref().unwrap_or_default()),
+            };
+            (Placed::from_file(name, &file), record::View::File(file))
+        }
+    })
 }
 
 /// The first camera that a node carries.

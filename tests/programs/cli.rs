@@ -49,6 +49,8 @@ mod important;
 mod lucerna;
 #[path = "../cli/papers.rs"]
 mod papers;
+#[path = "../cli/path.rs"]
+mod path;
 #[path = "../cli/prt.rs"]
 mod prt;
 #[path = "../cli/prt_bake.rs"]

@@ -255,6 +255,8 @@ impl Viewer {
 
     /// The camera as one that flies: the scene's camera becomes one.
     pub(super) fn flying(&mut self) -> Option<&mut Fly> {
+        // A person takes the camera.
+        self.cameras.land();
         if self.fly.is_none() {
             self.fly = self.as_flying();
         }
@@ -400,8 +402,13 @@ impl Viewer {
     }
 
     fn advance(&mut self, context: &Context) {
+        let step = context.input(|input| f64::from(input.stable_dt)).min(0.25);
+        if let Some(camera) = self.cameras.fly_on(step) {
+            self.fly = Some(Fly::from_file(&camera));
+            self.moves();
+            context.request_repaint();
+        }
         if self.playing {
-            let step = context.input(|input| f64::from(input.stable_dt)).min(0.25);
             let end = self.stage.as_ref().map_or(0.0, |stage| controls::duration(stage));
             if end > 0.0 {
                 self.seconds = (self.seconds + step) % end;

@@ -1,4 +1,4 @@
-//! The list of cameras that a person keeps, as a file that `--camera` reads.
+//! The list of cameras that a person keeps, as a file that `--camera` and `--camera-path` read, and flights through them.
 
 use std::path::{Path, PathBuf};
 
@@ -7,16 +7,31 @@ use lucerna::{Error, ErrorKind, Result, image};
 
 use super::{app::Viewer, fly::Fly, keys};
 use crate::{
+    camera::CameraFile,
+    path::{self, CameraPath},
     record::Source,
     views::{NamedView, ViewList},
 };
 
+/// Frames a second of a sequence that is written.
+const FPS: f64 = 25.0;
+
 /// Kept cameras.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Cameras {
     list: Vec<NamedView>,
     /// There are changes that no file has.
     unsaved: bool,
+    /// Time from each to the next of a flight, seconds.
+    seconds: f64,
+    /// Time of the flight that goes on.
+    flight: Option<f64>,
+}
+
+impl Default for Cameras {
+    fn default() -> Self {
+        Self { list: Vec::new(), unsaved: false, seconds: path::SECONDS, flight: None }
+    }
 }
 
 impl Cameras {
@@ -26,6 +41,34 @@ impl Cameras {
         self.list.push(NamedView::recorded(name.clone(), &fly.file()));
         self.unsaved = true;
         name
+    }
+
+    /// Keeps the views of a path.
+    pub fn keep_path(&mut self, path: &CameraPath) {
+        for view in &path.views {
+            let name = self.free();
+            self.list.push(NamedView::recorded(name, view));
+        }
+        self.seconds = path.seconds;
+    }
+
+    /// The flight through all cameras; `None`: it takes two.
+    fn path(&self) -> Option<CameraPath> {
+        let path = CameraPath { views: self.list.iter().map(NamedView::camera).collect(), seconds: self.seconds };
+        path.check().is_ok().then_some(path)
+    }
+
+    /// The camera of the flight after further `seconds`. `None`: none flies.
+    pub fn fly_on(&mut self, seconds: f64) -> Option<CameraFile> {
+        let now = self.flight? + seconds;
+        let path = self.path();
+        self.flight = path.as_ref().filter(|path| now < path.end()).map(|_| now);
+        path.map(|path| path.at(now))
+    }
+
+    /// Ends the flight.
+    pub fn land(&mut self) {
+        self.flight = None;
     }
 
     /// The first name that no camera has.
@@ -107,6 +150,7 @@ pub fn rows(viewer: &mut Viewer, ui: &mut Ui) {
     if viewer.cameras.is_empty() {
         return;
     }
+    flight(viewer, ui);
     let name = if viewer.cameras.unsaved { "Write the list •" } else { "Write the list" };
     let button = ui
         .button(name)
@@ -119,6 +163,51 @@ pub fn rows(viewer: &mut Viewer, ui: &mut Ui) {
             Err(error) => viewer.trouble = Some(error.to_string()),
         }
     }
+}
+
+/// A flight through the list, and its pictures as files.
+fn flight(viewer: &mut Viewer, ui: &mut Ui) {
+    if viewer.cameras.path().is_none() {
+        return;
+    }
+    ui.horizontal(|ui| {
+        let cameras = &mut viewer.cameras;
+        let flies = cameras.flight.is_some();
+        let button = ui.button(if flies { "⏸ Fly" } else { "▶ Fly" });
+        if button.on_hover_text("Fly through the cameras of the list").clicked() {
+            cameras.flight = if flies { None } else { Some(0.0) };
+        }
+        ui.add(egui::DragValue::new(&mut cameras.seconds).speed(0.05).range(0.05..=600.0).suffix(" s"))
+            .on_hover_text("From each camera to the next");
+        let record = ui.button("Record");
+        if record
+            .on_hover_text(format!("Write the flight as .png files, {FPS} a second, by a command that is copied, too"))
+            .clicked()
+        {
+            recorded(viewer, ui);
+        }
+    });
+}
+
+/// Writes the list of cameras, and has the command of side A write the pictures of the flight.
+fn recorded(viewer: &mut Viewer, ui: &Ui) {
+    let (Some(path), Some(stage)) = (viewer.cameras.path(), viewer.stage.clone()) else { return };
+    let list = match viewer.cameras.write(&stage.source) {
+        Ok(list) => list,
+        Err(error) => {
+            viewer.trouble = Some(error.to_string());
+            return;
+        }
+    };
+    let named = path::Named { list: list.display().to_string(), seconds: path.seconds };
+    if let Some(text) = keys::sequence(viewer, &named.to_string(), frames(path.end())) {
+        ui.ctx().copy_text(text);
+    }
+}
+
+/// Frames of a flight that takes so long, with one at its end.
+fn frames(seconds: f64) -> u32 {
+    (seconds * FPS + 1e-6) as u32 + 1
 }
 
 #[cfg(test)]
@@ -135,5 +224,22 @@ mod tests {
         let found = Fly::from_file(&cameras.list[1].camera());
         assert!(found.file().position.abs_diff_eq(fly.file().position, 1e-6));
         assert!(found.target().abs_diff_eq(fly.target(), 1e-5));
+    }
+
+    #[test]
+    fn a_flight_begins_at_the_first_camera_and_ends_at_the_last() {
+        let fly = |text: &str| Fly::from_file(&crate::camera::in_numbers(text).unwrap().unwrap());
+        let mut cameras = Cameras::default();
+        cameras.keep(&fly("0,1,2,0,0,0"));
+        assert!(cameras.path().is_none() && cameras.fly_on(0.1).is_none());
+        cameras.keep(&fly("4,1,2,4,0,0"));
+        cameras.flight = Some(0.0);
+        let steps: Vec<f32> = std::iter::from_fn(|| cameras.fly_on(0.25)).map(|camera| camera.position.x).collect();
+        assert!(steps.len() == 8 && steps.windows(2).all(|two| two[0] < two[1]), "{steps:?}");
+        assert!((steps[7] - 4.0).abs() < 1e-5);
+        assert_eq!([frames(2.0), frames(0.2), frames(0.0)], [51, 6, 1]);
+        let mut again = Cameras::default();
+        again.keep_path(&cameras.path().unwrap());
+        assert_eq!(again.path(), cameras.path());
     }
 }

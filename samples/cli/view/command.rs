@@ -188,6 +188,27 @@ fn scene(common: &Common<'_>, technique: &str, say: &mut impl FnMut(&[&str])) {
     }
 }
 
+/// The command of a sequence in the place of that of a picture: the camera flies along a path. `path`: as `--camera-path` has it.
+pub fn on_path(words: Vec<String>, path: &str, frames: u32) -> Vec<String> {
+    let mut out = Vec::new();
+    let mut words = words.into_iter();
+    while let Some(word) = words.next() {
+        match word.as_str() {
+            "--camera" => {
+                words.next();
+                out.extend(["--camera-path".to_owned(), path.to_owned()]);
+            }
+            // An animation begins with the flight.
+            "--time" | "--scene-time" => {
+                words.next();
+            }
+            _ => out.push(word),
+        }
+    }
+    out.extend(["--frames".to_owned(), format!("0..{frames}"), "--fps".to_owned(), "25".to_owned()]);
+    out
+}
+
 /// Words as a shell reads them.
 pub fn quoted(words: &[String]) -> String {
     let plain =

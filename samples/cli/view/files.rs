@@ -154,6 +154,10 @@ impl Viewer {
             record::View::File(_) => {
                 self.named_camera = Some((stage.placed.clone(), args.camera.clone().unwrap_or_default()));
             }
+            record::View::Path(path) => {
+                self.cameras.keep_path(path);
+                self.fly = Some(Fly::from_file(&path.at(args.time)));
+            }
         }
         self.moved.clear();
         self.held = None;
@@ -176,7 +180,7 @@ impl Viewer {
         let extension = file.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default();
         match extension.as_str() {
             "gltf" | "glb" | "obj" | "zip" => {
-                let mut args = StageArgs { camera: None, eye: None, ..self.newest_args() };
+                let mut args = StageArgs { camera: None, camera_path: None, eye: None, ..self.newest_args() };
                 (args.scene.scene, args.scene.builtin, args.scene.unit) = (Some(file), None, None);
                 args.put = Vec::new();
                 // An environment of the command line stays, and one that was dropped.

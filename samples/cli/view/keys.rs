@@ -108,6 +108,7 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
         viewer.false_colour = !viewer.false_colour;
     }
     if hit(Key::R) {
+        viewer.cameras.land();
         viewer.fly = None;
         viewer.moved.clear();
         viewer.moves();
@@ -240,9 +241,46 @@ pub fn screenshot(viewer: &mut Viewer, extension: &str) {
             return;
         }
     };
+    let file = free(&stem(viewer), viewer.sides[0].technique, extension);
+    write(viewer, words, file);
+}
+
+/// Has the command of side A write a sequence of pictures of a camera that flies, and returns the command; `None`: it said why not.
+pub fn sequence(viewer: &mut Viewer, path: &str, frames: u32) -> Option<String> {
+    if viewer.writing.is_some() {
+        viewer.say("a picture is being written already");
+        return None;
+    }
+    let words = words(viewer).and_then(|words| {
+        if words.first().is_some_and(|word| word == "render") {
+            Ok(command::on_path(words, path, frames))
+        } else {
+            Err("the path tracer writes sequences with `lucerna reference`".to_owned())
+        }
+    });
+    match words {
+        Ok(words) => {
+            let base = free(&stem(viewer), "flight", "png");
+            let file = base.with_file_name(format!("{}-{{frame:04}}.png", base.file_stem()?.to_string_lossy()));
+            let output = ["-o".to_owned(), file.display().to_string()];
+            let text = format!("lucerna {}", command::quoted(&[&words[..], &output].concat()));
+            write(viewer, words, file);
+            Some(text)
+        }
+        Err(why) => {
+            viewer.say(format!("not written: {why}"));
+            None
+        }
+    }
+}
+
+fn stem(viewer: &Viewer) -> String {
     let name = viewer.stage.as_ref().map_or_else(|| "scene".to_owned(), |stage| stage.scene.name.clone());
-    let name: String = name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).collect();
-    let file = free(&name, viewer.sides[0].technique, extension);
+    name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).collect()
+}
+
+/// Starts a command that writes a file.
+fn write(viewer: &mut Viewer, words: Vec<String>, file: PathBuf) {
     let started = std::env::current_exe().and_then(|program| {
         Command::new(program).args(words).arg("-q").arg("-o").arg(&file).stderr(Stdio::piped()).spawn()
     });
