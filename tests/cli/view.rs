@@ -114,6 +114,39 @@ fn the_camera_moves_and_comes_back_and_files_are_what_the_window_shows() {
 }
 
 #[test]
+fn a_flight_through_kept_cameras_ends_at_the_last() {
+    let Some(server) = ready() else { return };
+    let viewer = Viewer::bare(&server, "--technique isr --builtin cornell");
+    let first = by_command("render isr --builtin cornell --camera 0");
+    viewer.shows("the scene's camera", &first);
+    // One camera is no flight.
+    viewer.desktop.hit(letter('k'));
+    viewer.desktop.hit(letter('g'));
+    viewer.desktop.key(letter('w'), true);
+    std::thread::sleep(Duration::from_millis(300));
+    viewer.desktop.key(letter('w'), false);
+    viewer.desktop.hit(letter('k'));
+    // At rest: what is shown does not change for a second.
+    let rest = || {
+        let mut before = viewer.picture();
+        loop {
+            std::thread::sleep(Duration::from_secs(1));
+            let now = viewer.picture();
+            if now == before {
+                return now;
+            }
+            before = now;
+        }
+    };
+    let last = rest();
+    assert_ne!(last, first);
+    viewer.desktop.hit(letter('g'));
+    viewer.until("the flight", |picture| picture != last);
+    viewer.shows("the last camera", &last);
+    viewer.close();
+}
+
+#[test]
 fn a_stands_beside_the_path_tracer_and_the_window_closes_while_it_works() {
     let Some(server) = ready() else { return };
     let [width, height] = SIZE.map(usize::from);

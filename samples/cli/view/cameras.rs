@@ -127,6 +127,15 @@ pub fn keep(viewer: &mut Viewer) {
     }
 }
 
+/// Begins a flight through the kept cameras, or ends it.
+pub fn fly(viewer: &mut Viewer) {
+    if viewer.cameras.path().is_none() {
+        viewer.say("a flight takes two kept cameras (K)");
+    } else {
+        viewer.cameras.flight = viewer.cameras.flight.map_or(Some(0.0), |_| None);
+    }
+}
+
 /// The list in the panel.
 pub fn rows(viewer: &mut Viewer, ui: &mut Ui) {
     let (mut chosen, mut dropped) = (None, None);
@@ -172,10 +181,9 @@ fn flight(viewer: &mut Viewer, ui: &mut Ui) {
     }
     ui.horizontal(|ui| {
         let cameras = &mut viewer.cameras;
-        let flies = cameras.flight.is_some();
-        let button = ui.button(if flies { "⏸ Fly" } else { "▶ Fly" });
-        if button.on_hover_text("Fly through the cameras of the list").clicked() {
-            cameras.flight = if flies { None } else { Some(0.0) };
+        let button = ui.button(if cameras.flight.is_some() { "⏸ Fly" } else { "▶ Fly" });
+        if button.on_hover_text("Fly through the cameras of the list (G)").clicked() {
+            cameras.flight = cameras.flight.map_or(Some(0.0), |_| None);
         }
         ui.add(egui::DragValue::new(&mut cameras.seconds).speed(0.05).range(0.05..=600.0).suffix(" s"))
             .on_hover_text("From each camera to the next");

@@ -18,7 +18,7 @@ use super::{
 };
 
 /// What keys and the mouse do.
-pub const HELP: [(&str, &str); 26] = [
+pub const HELP: [(&str, &str); 27] = [
     ("Drag", "look around; on a lamp: move the lamp; on the line: move the line"),
     ("Alt drag, middle drag", "orbit around the point in the middle of the picture"),
     ("Shift drag", "pan: move parallel to the picture"),
@@ -28,6 +28,7 @@ pub const HELP: [(&str, &str); 26] = [
     ("R", "back to the scene's camera, and lamps to their places"),
     ("N", "the scene's next camera"),
     ("K", "keep the camera in the list of cameras"),
+    ("G", "fly through the cameras of the list, or stop"),
     ("Enter", "play or stop the animation"),
     ("C", "the next way to compare A and B"),
     ("Space", "B, as long as it is held"),
@@ -124,6 +125,9 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
     }
     if hit(Key::K) {
         cameras::keep(viewer);
+    }
+    if hit(Key::G) {
+        cameras::fly(viewer);
     }
     if hit(Key::Enter) {
         viewer.playing = !viewer.playing;
