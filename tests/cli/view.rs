@@ -142,7 +142,10 @@ fn a_flight_through_kept_cameras_ends_at_the_last() {
     assert_ne!(last, first);
     viewer.desktop.hit(letter('g'));
     viewer.until("the flight", |picture| picture != last);
-    viewer.shows("the last camera", &last);
+    // A kept camera has a target in the place of two angles, so that single pixels may differ.
+    viewer.until("the last camera", |picture| {
+        picture.iter().zip(&last).filter(|(now, before)| now != before).count() * 100 < picture.len()
+    });
     viewer.close();
 }
 
