@@ -9,14 +9,16 @@ use std::path::Path;
 
 use glam::{UVec2, Vec2, Vec3, Vec4, uvec2};
 
-use super::{Limits, Material, Mesh, Node, Note, NoteKind, Primitive, Scene};
+use super::{Limits, Material, Mesh, Node, Note, NoteKind, Primitive, Scene, extent};
 use crate::{
     Error, ErrorKind, Result,
     image::{self, Layers},
 };
 
-/// Most squares along an edge of the grid from which triangles are taken. A larger map is averaged.
+/// Most squares between samples along an edge. A larger map is averaged.
 const MOST_SQUARES: u32 = 4096;
+/// Largest height and error, metres.
+const HIGHEST: f32 = 1e5;
 /// Albedo, linear Rec. 709: dry grass.
 const GRASS: Vec3 = Vec3::new(0.21, 0.23, 0.11);
 /// Name of the node, of the mesh and of the material.
@@ -25,10 +27,12 @@ pub const NAME: &str = "terrain";
 /// A map of heights.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeightMap {
-    /// Columns and rows.
+    /// Columns and rows, at least two each.
     pub size: UVec2,
     /// Rows from the top of the picture, which lies at −Z. Whole numbers of a file are 0 to 1, floating-point numbers are as they are.
     pub values: Vec<f32>,
+    /// The values are floating-point numbers of a file, usually metres.
+    pub metres: bool,
 }
 
 /// The place of a terrain in a scene.
@@ -38,17 +42,22 @@ pub struct Terrain {
     pub width: f32,
     /// Height of the value 1 over the value 0, metres.
     pub height: f32,
-    /// Largest difference between a height of the map and the surface, metres. 0: every sample of the map that is off its neighbours' plane.
+    /// Largest difference between a sample of the map and the surface, metres. 0: every sample of the map that is off its neighbours' plane.
     pub error: f32,
     /// World position of the middle at the value 0, metres.
     pub middle: Vec3,
 }
 
 impl Terrain {
-    /// Usual numbers for a map: one metre a sample, a tenth of the width for its values, and a thousandth of this height as error.
-    pub fn of(map: &HeightMap) -> Self {
-        let width = (map.size.max_element() - 1) as f32;
-        Self { width, height: 0.1 * width, error: 1e-4 * width, middle: Vec3::ZERO }
+    /// Usual numbers for a map, where none is given: one metre from sample to sample; a height of a tenth of the width, or of 1 m if the values are metres;
+    /// an error of a thousandth of the difference between the highest and the lowest place.
+    pub fn of(map: &HeightMap, width: Option<f32>, height: Option<f32>, error: Option<f32>) -> Self {
+        let width = width.unwrap_or((map.size.max_element() - 1) as f32);
+        let height = height.unwrap_or(if map.metres { 1.0 } else { (0.1 * width).min(HIGHEST) });
+        let most = map.values.iter().copied().fold(f32::MIN, f32::max);
+        let least = map.values.iter().copied().fold(f32::MAX, f32::min);
+        let error = error.unwrap_or_else(|| (1e-3 * height.abs() * (most - least)).clamp(0.0, HIGHEST));
+        Self { width, height, error, middle: Vec3::ZERO }
     }
 
     /// Whether the numbers are in their ranges.
@@ -62,10 +71,10 @@ impl Terrain {
         if !(1e-3..=1e6).contains(&self.width) {
             return wrong("the width", self.width, "0.001 to 1000000 metres");
         }
-        if !(-1e5..=1e5).contains(&self.height) {
+        if !(-HIGHEST..=HIGHEST).contains(&self.height) {
             return wrong("the height", self.height, "-100000 to 100000 metres");
         }
-        if !(0.0..=1e5).contains(&self.error) {
+        if !(0.0..=HIGHEST).contains(&self.error) {
             return wrong("the error", self.error, "0 to 100000 metres");
         }
         if !self.middle.is_finite() {
@@ -89,7 +98,8 @@ impl HeightMap {
         let (map, note) = match super::texture::luma(bytes, limits)? {
             Some((size, codes, color)) => {
                 let values = codes.into_iter().map(|code| f32::from(code) / f32::from(u16::MAX)).collect();
-                (Self { size, values }, color.then_some("colours of the height map; its heights are their luma"))
+                let note = color.then_some("colours of the height map; its heights are their luma");
+                (Self { size, values, metres: false }, note)
             }
             None => Self::of_layers(&image::decode(bytes, limits)?)?,
         };
@@ -111,13 +121,13 @@ impl HeightMap {
         let values: Vec<f32> = layer.data.iter().copied().step_by(step).collect();
         let grey = layer.data.chunks_exact(step).all(|all| all.iter().take(3).all(|one| *one == all[0]));
         let more = picture.layers.len() > 1 || !grey;
-        let map = Self { size: uvec2(picture.width, picture.height), values };
+        let map = Self { size: uvec2(picture.width, picture.height), values, metres: true };
         Ok((map, more.then_some("all channels of the height map but the first")))
     }
 
-    /// The value at a place, 0 to 1 along each edge, between four samples.
-    fn between(&self, at: Vec2) -> f32 {
-        let place = at * (self.size - 1).as_vec2();
+    /// The value at a place, samples from the upper left one, between four samples.
+    fn between(&self, place: Vec2) -> f32 {
+        let place = place.clamp(Vec2::ZERO, (self.size - 1).as_vec2());
         let corner = place.floor().as_uvec2().min(self.size - 2);
         let share = place - corner.as_vec2();
         let value = |x: u32, y: u32| self.values[((corner.y + y) * self.size.x + corner.x + x) as usize];
@@ -125,39 +135,52 @@ impl HeightMap {
         row(0) + share.y * (row(1) - row(0))
     }
 
-    /// The mean around a place, for a grid of `squares` squares, which may be wider than the samples.
-    fn around(&self, at: UVec2, squares: u32) -> f32 {
-        let step = (self.size - 1).as_vec2() / squares as f32;
+    /// A map with at most [`MOST_SQUARES`] squares along an edge, each sample of which is the mean around its place.
+    fn averaged(&self) -> Self {
+        let before = (self.size - 1).as_vec2();
+        let size = (before * (MOST_SQUARES as f32 / before.max_element())).round().as_uvec2().max(UVec2::ONE) + 1;
+        let step = before / (size - 1).as_vec2();
         let taps = step.ceil().as_uvec2().max(UVec2::ONE);
-        if taps == UVec2::ONE {
-            return self.between(at.as_vec2() / squares as f32);
-        }
-        let mut sum = 0.0;
-        for y in 0..taps.y {
-            for x in 0..taps.x {
-                let off = (uvec2(x, y).as_vec2() + 0.5) / taps.as_vec2() - 0.5;
-                sum += self.between(((at.as_vec2() + off) / squares as f32).clamp(Vec2::ZERO, Vec2::ONE));
+        let mut values = Vec::with_capacity(size.x as usize * size.y as usize);
+        for y in 0..size.y {
+            for x in 0..size.x {
+                let mut sum = 0f64;
+                for tap_y in 0..taps.y {
+                    for tap_x in 0..taps.x {
+                        let off = (uvec2(tap_x, tap_y).as_vec2() + 0.5) / taps.as_vec2() - 0.5;
+                        sum += f64::from(self.between((uvec2(x, y).as_vec2() + off) * step));
+                    }
+                }
+                values.push((sum / (f64::from(taps.x) * f64::from(taps.y))) as f32);
             }
         }
-        sum / (taps.x * taps.y) as f32
+        Self { size, values, metres: self.metres }
     }
 }
 
 /// Adds a terrain to a scene as its last node. The top of the picture lies at −Z, its left edge at −X.
 ///
 /// # Errors
-/// `Usage` for numbers out of range, and if the error needs more vertices than `limits` allow; `OutOfMemory` if there is no room for the grid.
+/// `Usage` for numbers out of range, heights that are too large, and if the error needs more vertices than `limits` allow; `OutOfMemory` if there is no room
+/// for the grid.
 pub fn add(scene: &mut Scene, map: &HeightMap, terrain: &Terrain, limits: &Limits) -> Result<()> {
     terrain.check()?;
-    let squares = (map.size.max_element() - 1).next_power_of_two().min(MOST_SQUARES);
-    if map.size.max_element() - 1 > squares {
-        let text = format!("{} × {} samples are averaged to {squares} × {squares}", map.size.x, map.size.y);
-        scene.notes.push(Note { kind: NoteKind::Approximated, place: NAME.into(), text });
-    }
-    let grid = Grid::of(map, squares, terrain.height)?;
     let edges = (map.size - 1).as_vec2();
     let size = terrain.width * edges / edges.max_element();
+    let averaged = (map.size.max_element() - 1 > MOST_SQUARES).then(|| map.averaged());
+    if let Some(averaged) = &averaged {
+        let text = format!(
+            "{} × {} samples are averaged to {} × {}; the error is that against the averages",
+            map.size.x, map.size.y, averaged.size.x, averaged.size.y
+        );
+        scene.notes.push(Note { kind: NoteKind::Approximated, place: NAME.into(), text });
+    }
+    let grid = Grid::of(averaged.as_ref().unwrap_or(map), terrain.height)?;
     let mut primitive = grid.triangles(terrain, size, limits)?;
+    let reach = primitive.positions.iter().map(|place| place.abs().max_element()).fold(0.0, f32::max);
+    if !(reach <= extent::FARTHEST) {
+        return Err(too_far(reach));
+    }
     primitive.material = scene.materials.len() as u32;
     scene.materials.push(Material::diffuse(NAME, GRASS));
     let mesh = scene.meshes.len() as u32;
@@ -166,10 +189,19 @@ pub fn add(scene: &mut Scene, map: &HeightMap, terrain: &Terrain, limits: &Limit
     Ok(())
 }
 
-/// Heights on a square grid whose edge is a power of two, and the error of each middle.
+fn too_far(reach: f32) -> Error {
+    let what =
+        format!("a terrain reaches {reach:e} m, which is too far from the origin; {:e} m is allowed", extent::FARTHEST);
+    Error::usage(what).help("Give a smaller height, width or place")
+}
+
+/// The samples of a map on a square grid whose edge is a power of two, and the error of each middle. Beyond the map its last samples go on; triangles
+/// that reach across its rim are always halved, and those beyond are left out.
 struct Grid {
     /// Squares along an edge.
     squares: u32,
+    /// Column and row of the map's last sample.
+    last: UVec2,
     /// Metres over the value 0.
     heights: Vec<f32>,
     /// Bound of the error of the triangles that the vertex halves, metres.
@@ -177,7 +209,9 @@ struct Grid {
 }
 
 impl Grid {
-    fn of(map: &HeightMap, squares: u32, height: f32) -> Result<Self> {
+    fn of(map: &HeightMap, height: f32) -> Result<Self> {
+        let last = map.size - 1;
+        let squares = last.max_element().next_power_of_two();
         let line = squares as usize + 1;
         let room = |list: &mut Vec<f32>| {
             let full = |error| Error::new(ErrorKind::OutOfMemory, "no room for the grid of a terrain").caused_by(error);
@@ -187,10 +221,15 @@ impl Grid {
         room(&mut heights)?;
         room(&mut errors)?;
         for y in 0..=squares {
-            heights.extend((0..=squares).map(|x| height * map.around(uvec2(x, y), squares)));
+            let row = &map.values[(y.min(last.y) * map.size.x) as usize..][..map.size.x as usize];
+            heights.extend((0..=squares).map(|x| height * row[x.min(last.x) as usize]));
+        }
+        // A difference of infinite heights is no number, which the errors would not tell.
+        if let Some(far) = heights.iter().find(|height| !(height.abs() <= extent::FARTHEST)) {
+            return Err(too_far(*far));
         }
         errors.resize(line * line, 0.0);
-        let mut grid = Self { squares, heights, errors };
+        let mut grid = Self { squares, last, heights, errors };
         grid.find_errors();
         Ok(grid)
     }
@@ -222,7 +261,7 @@ impl Grid {
             let first = if along.x > 0 { step } else { 0 };
             for x in (first..=self.squares).step_by(2 * step as usize) {
                 let at = uvec2(x, y);
-                let own = self.off(at, at - along, at + along);
+                let own = self.own(at, step, at - along, at + along);
                 let mut below = 0f32;
                 if half > 0 {
                     // The middles of the four squares that meet the side at its middle.
@@ -242,7 +281,7 @@ impl Grid {
             for x in (step..self.squares).step_by(2 * step as usize) {
                 let at = uvec2(x, y);
                 let end = self.diagonal(at, step);
-                let own = self.off(at, end, at + at - end);
+                let own = self.own(at, step, end, at + at - end);
                 let mut below = 0f32;
                 for (dx, dy) in [(-1, 0), (1, 0), (0, -1), (0, 1)] {
                     below = below.max(self.error_beside(at, dx * step as i32, dy * step as i32));
@@ -262,7 +301,15 @@ impl Grid {
         uvec2(odd(at.x - step), odd(at.y - step))
     }
 
-    fn off(&self, at: UVec2, a: UVec2, b: UVec2) -> f32 {
+    /// The change of the height at the middle of two ends, if it is a sample; infinite where triangles that reach so far from it cross the rim.
+    fn own(&self, at: UVec2, reach: u32, a: UVec2, b: UVec2) -> f32 {
+        let crosses = |at: u32, last: u32| at.saturating_sub(reach) < last && last < at + reach;
+        if crosses(at.x, self.last.x) || crosses(at.y, self.last.y) {
+            return f32::INFINITY;
+        }
+        if at.cmpgt(self.last).any() {
+            return 0.0;
+        }
         (self.height(at) - 0.5 * (self.height(a) + self.height(b))).abs()
     }
 
@@ -288,6 +335,9 @@ impl Grid {
                 left.extend([(right, a, middle), (b, right, middle)]);
                 continue;
             }
+            if [a, right, b].iter().any(|corner| corner.cmpgt(self.last).any()) {
+                continue;
+            }
             for corner in [a, right, b] {
                 let index = self.index(corner);
                 if numbers[index] == u32::MAX {
@@ -305,7 +355,7 @@ impl Grid {
         let mut out = Primitive { indices, tangents: vec![Vec4::ZERO; count], ..Primitive::default() };
         let mut uvs = Vec::with_capacity(count);
         for at in used {
-            let uv = at.as_vec2() / self.squares as f32;
+            let uv = at.as_vec2() / self.last.as_vec2();
             let flat = (uv - 0.5) * size;
             out.positions.push(terrain.middle + Vec3::new(flat.x, self.height(at), flat.y));
             out.normals.push(self.normal(at, size));
@@ -317,8 +367,8 @@ impl Grid {
 
     /// The normal by the differences between the neighbours on the grid.
     fn normal(&self, at: UVec2, size: Vec2) -> Vec3 {
-        let (low, high) = (at.saturating_sub(UVec2::ONE), (at + 1).min(UVec2::splat(self.squares)));
-        let step = (high - low).as_vec2() * size / self.squares as f32;
+        let (low, high) = (at.saturating_sub(UVec2::ONE), (at + 1).min(self.last));
+        let step = (high - low).as_vec2() * size / self.last.as_vec2();
         let slope_x = (self.height(uvec2(high.x, at.y)) - self.height(uvec2(low.x, at.y))) / step.x;
         let slope_z = (self.height(uvec2(at.x, high.y)) - self.height(uvec2(at.x, low.y))) / step.y;
         Vec3::new(-slope_x, 1.0, -slope_z).normalize()

@@ -31,7 +31,12 @@ impl FromStr for Named {
             Some((list, seconds)) => {
                 let seconds =
                     seconds.trim().parse::<f64>().ok().filter(|seconds| *seconds > 0.0 && *seconds <= LONGEST);
-                (list, seconds.ok_or_else(|| format!("the time is no number from 0 to {LONGEST}: {text}"))?)
+                (
+                    list,
+                    seconds.ok_or_else(|| {
+                        format!("{seconds:?} is no time above 0, up to {LONGEST} s; expected LIST.toml[,SECONDS]")
+                    })?,
+                )
             }
             None => (text, SECONDS),
         };
@@ -64,8 +69,8 @@ impl Named {
     }
 }
 
-/// A flight through views: places and distances lie on Catmull-Rom curves (Catmull and Rom 1974), and so do the directions, made as long as a
-/// unit. Before its begin and after its end the camera stands still.
+/// A flight through views: places lie on a Catmull-Rom curve (Catmull and Rom 1974), and so do directions, which are normalised; the distance of the
+/// target, the angle of view and the near plane change linearly. Before its begin and after its end the camera stands still.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CameraPath {

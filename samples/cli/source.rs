@@ -43,8 +43,8 @@ pub struct SceneArgs {
     #[arg(long, value_name = "MATERIAL.albedo=R,G,B")]
     pub set: Vec<Change>,
 
-    /// Land from a height map: a picture whose values are heights. WIDTH of the longer edge, HEIGHT of the whole range, largest ERROR, and place of the
-    /// middle, metres [default: 1 m a pixel, a tenth of WIDTH, a thousandth of HEIGHT, 0,0,0]
+    /// Land from a height map: a picture whose values are heights. WIDTH of the longer edge, HEIGHT of the value 1, largest ERROR, and place of the
+    /// middle, metres [default: 1 m a pixel, a tenth of WIDTH (1 m for .exr, .pfm and .hdr), a thousandth of the difference in height, 0,0,0]
     #[arg(long, value_name = "FILE[@WIDTH[,HEIGHT[,ERROR[,X,Y,Z]]]]", conflicts_with = "ground")]
     pub terrain: Option<Terrain>,
 
@@ -81,6 +81,11 @@ impl SceneArgs {
         }
         changed::all(&mut scene, &self.set)?;
         Ok((self.ground.place(scene, self.unit)?, source))
+    }
+
+    /// Whether the options name a scene.
+    pub fn is_named(&self) -> bool {
+        self.scene.is_some() || self.builtin.is_some() || self.terrain.is_some()
     }
 
     /// Adds the objects.

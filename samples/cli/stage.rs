@@ -59,7 +59,7 @@ pub struct StageArgs {
     pub camera: Option<String>,
 
     /// Fly the camera through the views of a list (`lucerna views`, or kept in the window): from each to the next in SECONDS [default: 2]; time 0 is
-    /// the first view. With --frames
+    /// the first view. `render --frames` makes a sequence
     #[arg(long, value_name = "LIST.toml[,SECONDS]", conflicts_with = "camera", help_heading = "Picture")]
     pub camera_path: Option<path::Named>,
 

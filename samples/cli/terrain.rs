@@ -32,7 +32,9 @@ impl FromStr for Terrain {
         let wrong = || "expected FILE[@WIDTH[,HEIGHT[,ERROR[,X,Y,Z]]]], like hills.png@2000,300".to_owned();
         // Names of files may contain the sign as well.
         let (file, numbers) = match text.rsplit_once('@') {
-            Some((file, numbers)) if numbers.starts_with(|c: char| c.is_ascii_digit() || "+-.".contains(c)) => {
+            Some((file, numbers))
+                if numbers.split(',').next().is_some_and(|word| word.trim().parse::<f32>().is_ok()) =>
+            {
                 (file, numbers.split(',').collect())
             }
             _ => (text, Vec::new()),
@@ -78,20 +80,16 @@ impl Terrain {
         Path::new(&self.file)
     }
 
-    /// The numbers for a terrain of the usual numbers `usual`.
-    fn numbers(&self, usual: terrain::Terrain) -> terrain::Terrain {
-        let width = self.width.unwrap_or(usual.width);
-        let ratio = width / usual.width;
-        terrain::Terrain {
-            width,
-            height: self.height.unwrap_or(usual.height * ratio),
-            error: self.error.unwrap_or_else(|| 1e-3 * self.height.map_or(usual.height * ratio, f32::abs)),
-            middle: self.middle,
-        }
-    }
-
+    /// Checks the numbers that are given.
     fn check(&self) -> Result<()> {
-        self.numbers(terrain::Terrain { width: 1.0, height: 0.1, error: 1e-4, middle: Vec3::ZERO }).check()
+        let Self { width, height, error, middle, .. } = *self;
+        let given = terrain::Terrain {
+            width: width.unwrap_or(1.0),
+            height: height.unwrap_or(0.0),
+            error: error.unwrap_or(0.0),
+            middle,
+        };
+        given.check()
     }
 
     /// Adds the terrain to a scene.
@@ -102,7 +100,8 @@ impl Terrain {
         let limits = Limits::default();
         let (map, notes) = HeightMap::read(self.file(), &limits).map_err(|error| error.at("--terrain"))?;
         scene.notes.extend(notes);
-        let numbers = self.numbers(terrain::Terrain::of(&map));
+        let usual = terrain::Terrain::of(&map, self.width, self.height, self.error);
+        let numbers = terrain::Terrain { middle: self.middle, ..usual };
         terrain::add(scene, &map, &numbers, &limits).map_err(|error| error.in_file(self.file()))
     }
 }
@@ -122,10 +121,7 @@ mod tests {
         let short = read("hills.png@2000,300,1").unwrap();
         assert_eq!(short.to_string(), "hills.png@2000,300,1,0,0,0");
         assert_eq!(read(&short.to_string()).unwrap(), short);
-        let usual = terrain::Terrain { width: 99.0, height: 9.9, error: 9.9e-3, middle: Vec3::ZERO };
-        assert_eq!(read("hills.png").unwrap().numbers(usual), usual);
-        let wide = read("hills.png@990").unwrap().numbers(usual);
-        assert!((wide.height - 99.0).abs() < 1e-3 && (wide.error - 0.099).abs() < 1e-5, "{wide:?}");
+        assert_eq!(read("hills@2x.png").unwrap().file(), Path::new("hills@2x.png"));
         for (bad, said) in [
             ("", "expected FILE"),
             ("@20", "expected FILE"),

@@ -26,8 +26,9 @@ fn wrong_paths_are_refused_and_named() {
     let folder = tempfile::tempdir().unwrap();
     let one = folder.path().join("one.toml");
     std::fs::write(&one, LIST.split("[[view]]\nname = \"b\"").next().unwrap()).unwrap();
-    let fly =
-        |path: &str| isr(["render", "--builtin", "cornell", "--frames", "0..2", "-o", "x.png", "--camera-path", path]);
+    let fly = |path: &str| {
+        isr(["render", "--builtin", "cornell", "--frames", "0..2", "-o", "x{frame}.png", "--camera-path", path])
+    };
     fly(one.to_str().unwrap()).expect(3, &["one.toml", "2 to 10000 views", "--camera-path"]);
     fly("no/such.toml").expect(3, &["no/such.toml"]);
     fly("list.toml,0").expect(2, &["--camera-path"]);

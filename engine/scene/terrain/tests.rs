@@ -4,7 +4,7 @@ use super::*;
 
 fn map(size: UVec2, value: impl Fn(f32, f32) -> f32) -> HeightMap {
     let at = |i: u32| value((i % size.x) as f32 / (size.x - 1) as f32, (i / size.x) as f32 / (size.y - 1) as f32);
-    HeightMap { size, values: (0..size.x * size.y).map(at).collect() }
+    HeightMap { size, values: (0..size.x * size.y).map(at).collect(), metres: false }
 }
 
 fn hills(x: f32, y: f32) -> f32 {
@@ -91,21 +91,65 @@ fn a_plane_takes_two_triangles_and_a_step_takes_many() {
 }
 
 #[test]
-fn sizes_that_are_no_powers_of_two_keep_their_heights() {
-    let odd = map(uvec2(50, 23), hills);
-    let terrain = Terrain { width: 49.0, height: 10.0, error: 0.0, middle: Vec3::ZERO };
-    let all = triangles(&mesh(&odd, &terrain));
-    for i in (0..50 * 23).step_by(7) {
-        let at = Vec3::new((i % 50) as f32 - 24.5, 0.0, (i / 50) as f32 - 11.0) * 0.9999;
-        let off = (height_at(&all, at) - 10.0 * odd.values[i]).abs();
-        assert!(off < 0.15, "{at}: {off}");
+fn maps_of_any_size_are_within_the_error_of_every_sample() {
+    for (size, error) in
+        [(uvec2(50, 23), 0.3), (uvec2(17, 40), 0.1), (uvec2(64, 64), 0.5), (uvec2(2, 9), 0.01), (uvec2(3, 2), 0.0)]
+    {
+        // A single high sample counts, too.
+        let mut odd = map(size, hills);
+        let peak = (size.x / 2 + size.x * (size.y / 2)) as usize;
+        odd.values[peak] = 1.0;
+        let width = (size.max_element() - 1) as f32;
+        let terrain = Terrain { width, height: 10.0, error, middle: Vec3::ZERO };
+        let mesh = mesh(&odd, &terrain);
+        let all = triangles(&mesh);
+        let area: f32 = all.iter().map(|[a, b, c]| 0.5 * (*b - *a).cross(*c - *a).y).sum();
+        let edges = (size - 1).as_vec2();
+        assert!((area - edges.x * edges.y).abs() < 1e-2, "{size}: {area}");
+        for i in 0..size.x * size.y {
+            let at = (uvec2(i % size.x, i / size.x).as_vec2() - 0.5 * edges).extend(0.0);
+            let off = (height_at(&all, Vec3::new(at.x, 0.0, at.y)) - 10.0 * odd.values[i as usize]).abs();
+            assert!(off <= 1.001 * error + 1e-4, "{size}, sample {i}: {off}");
+        }
+        assert!(mesh.uvs[0].iter().all(|uv| uv.cmpge(Vec2::ZERO).all() && uv.cmple(Vec2::ONE).all()));
+    }
+}
+
+#[test]
+fn large_maps_are_averaged_and_that_is_said() {
+    let size = uvec2(12_289, 3);
+    let values = (0..size.x * size.y).map(|i| if i % size.x % 3 == 0 { 1.0 } else { 0.0 }).collect();
+    let map = HeightMap { size, values, metres: false };
+    let mut scene = Scene::default();
+    add(&mut scene, &map, &Terrain::of(&map, None, Some(3.0), Some(0.5)), &Limits::default()).unwrap();
+    assert!(scene.notes[0].text.contains("averaged to 4097 × 2"), "{}", scene.notes[0].text);
+    let heights = scene.meshes[0].primitives[0].positions.iter().map(|place| place.y);
+    assert!(heights.clone().fold(0.0, f32::max) < 2.0 && heights.fold(9.0, f32::min) > 0.5);
+}
+
+#[test]
+fn usual_numbers_follow_the_map() {
+    let whole = map(uvec2(101, 51), |x, _| 0.2 + 0.5 * x);
+    let usual = Terrain::of(&whole, None, None, None);
+    assert_eq!((usual.width, usual.height), (100.0, 10.0));
+    assert!((usual.error - 5e-3).abs() < 1e-6);
+    let wide = Terrain::of(&whole, Some(990.0), None, None);
+    assert!((wide.height - 99.0).abs() < 1e-3 && (wide.error - 0.0495).abs() < 1e-5, "{wide:?}");
+    // Metres stay metres.
+    let metres = HeightMap { values: whole.values.iter().map(|value| 400.0 * value).collect(), metres: true, ..whole };
+    let usual = Terrain::of(&metres, Some(3000.0), None, None);
+    assert_eq!(usual.height, 1.0);
+    assert!((usual.error - 0.2).abs() < 1e-4);
+    for width in [4, 7, 12] {
+        let small = map(uvec2(width, 2), hills);
+        Terrain::of(&small, Some(1e6), None, None).check().unwrap();
     }
 }
 
 #[test]
 fn numbers_out_of_range_are_refused_and_named() {
     let map = map(uvec2(3, 3), hills);
-    let usual = Terrain::of(&map);
+    let usual = Terrain::of(&map, None, None, None);
     for (terrain, name) in [
         (Terrain { width: 0.0, ..usual }, "the width"),
         (Terrain { height: f32::NAN, ..usual }, "the height"),
@@ -114,6 +158,11 @@ fn numbers_out_of_range_are_refused_and_named() {
     ] {
         let error = add(&mut Scene::default(), &map, &terrain, &Limits::default()).unwrap_err();
         assert!(error.exit_code() == 2 && error.to_string().contains(name), "{error}");
+    }
+    let far = HeightMap { values: vec![1e20; 9], metres: true, ..map.clone() };
+    for height in [1.0, 1e5] {
+        let error = add(&mut Scene::default(), &far, &Terrain { height, ..usual }, &Limits::default()).unwrap_err();
+        assert!(error.exit_code() == 2 && error.to_string().contains("too far"), "{error}");
     }
     let few = Limits { max_vertices: 9, ..Limits::default() };
     let error = add(&mut Scene::default(), &map, &Terrain { error: 0.0, ..usual }, &few).unwrap_err();

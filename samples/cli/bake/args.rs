@@ -23,6 +23,7 @@ pub struct BakeArgs {
         short,
         long,
         value_name = "FILE",
+        required = false,
         required_unless_present = "print_config",
         default_value_if("print_config", "true", "unused"),
         help_heading = "Output"

@@ -65,8 +65,7 @@ fn preview(args: &FivArgs, given: &mut Given<Fiv>, stage: &mut Option<Stage>) ->
     if !matches!(full.method, Method::Vectors | Method::Online) {
         return Ok(());
     }
-    let named = place.scene.scene.is_some() || place.scene.builtin.is_some();
-    if stage.is_none() && named {
+    if stage.is_none() && place.scene.is_named() {
         *stage = Some(Stage::open(place)?);
     }
     let scene = stage.as_ref().map(|stage| &stage.scene);

@@ -2,7 +2,7 @@
 //!
 //! A picture is untrusted data. Its metadata are parsed into the same settings as the command line, and rendered in this process. No
 //! program is started, no file is written, and the picture cannot set command line options. The picture may name these files: the scene,
-//! further files in the scene's folder, the environment, for `daylight` and `prt` the bake, for `tonemap` its input, and a pipeline of
+//! further files in the scene's folder, the height map of a terrain, the environment, for `daylight` and `prt` the bake, for `tonemap` its input, and a pipeline of
 //! post-processing with its shaders. Each file is printed before it is read. Work that
 //! would take hours is refused without `--long`.
 

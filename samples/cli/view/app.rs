@@ -75,6 +75,20 @@ pub(super) enum Held {
 pub(super) struct Writing {
     pub file: PathBuf,
     pub child: std::process::Child,
+    /// Its errors, in a file, because a pipe that nobody reads would stop it.
+    pub said: std::fs::File,
+    /// A sequence, which ends with the window.
+    pub sequence: bool,
+}
+
+impl Drop for Writing {
+    fn drop(&mut self) {
+        if self.sequence {
+            // A process that has ended already is no fault.
+            let _ = self.child.kill();
+            let _ = self.child.wait();
+        }
+    }
 }
 
 /// The viewer.
@@ -212,8 +226,7 @@ impl Viewer {
             args: args.stage,
         };
         viewer.followed = pipeline.map(|pipeline| Followed::new(pipeline, &viewer.wake));
-        let scene = &viewer.args.scene;
-        if scene.scene.is_some() || scene.builtin.is_some() {
+        if viewer.args.scene.is_named() {
             let args = viewer.args.clone();
             viewer.read(args);
         }

@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use egui::Ui;
-use lucerna::{Error, ErrorKind, Result, image};
+use lucerna::{Error, ErrorKind, image};
 
 use super::{app::Viewer, fly::Fly, keys};
 use crate::{
@@ -81,7 +81,7 @@ impl Cameras {
     ///
     /// # Errors
     /// As [`ViewList::read`].
-    pub fn read(&mut self, file: &Path) -> Result<usize> {
+    pub fn read(&mut self, file: &Path) -> lucerna::Result<usize> {
         let list = ViewList::read(file)?.views;
         let count = list.len();
         self.unsaved |= !self.list.is_empty();
@@ -98,7 +98,7 @@ impl Cameras {
     ///
     /// # Errors
     /// `Output` if it cannot be written.
-    pub fn write(&mut self, scene: &Source) -> Result<PathBuf> {
+    pub fn write(&mut self, scene: &Source) -> lucerna::Result<PathBuf> {
         let name = match scene {
             Source::File(name) | Source::Builtin(name) => name.as_str(),
             Source::Terrain => "terrain",
@@ -153,6 +153,7 @@ pub fn rows(viewer: &mut Viewer, ui: &mut Ui) {
         viewer.cameras.list.remove(index);
     }
     if let Some(camera) = chosen {
+        viewer.cameras.land();
         viewer.fly = Some(Fly::from_file(&camera));
         viewer.moves();
     }
@@ -181,41 +182,44 @@ fn flight(viewer: &mut Viewer, ui: &mut Ui) {
     }
     ui.horizontal(|ui| {
         let cameras = &mut viewer.cameras;
-        let button = ui.button(if cameras.flight.is_some() { "⏸ Fly" } else { "▶ Fly" });
+        let button = ui.button(if cameras.flight.is_some() { "⏹ Fly" } else { "▶ Fly" });
         if button.on_hover_text("Fly through the cameras of the list (G)").clicked() {
             cameras.flight = cameras.flight.map_or(Some(0.0), |_| None);
         }
-        ui.add(egui::DragValue::new(&mut cameras.seconds).speed(0.05).range(0.05..=600.0).suffix(" s"))
-            .on_hover_text("From each camera to the next");
-        let record = ui.button("Record");
-        if record
-            .on_hover_text(format!("Write the flight as .png files, {FPS} a second, by a command that is copied, too"))
-            .clicked()
-        {
-            recorded(viewer, ui);
+        let seconds = egui::DragValue::new(&mut cameras.seconds).speed(0.05).range(0.05..=600.0).suffix(" s");
+        ui.add(seconds.clamp_existing_to_range(false)).on_hover_text("From each camera to the next");
+        if viewer.writing.as_ref().is_some_and(|writing| writing.sequence) {
+            if ui.button("⏹ Record").on_hover_text("Stop writing the sequence").clicked() {
+                viewer.writing = None;
+            }
+            return;
+        }
+        let record = ui.button("Record").on_hover_text(format!(
+            "Write the flight as .png files, {FPS} a second, by a command that is copied, too. It ends with the window"
+        ));
+        if record.clicked() {
+            match recorded(viewer) {
+                Ok(text) => ui.ctx().copy_text(text),
+                Err(why) => viewer.say(format!("not written: {why}")),
+            }
         }
     });
 }
 
-/// Writes the list of cameras, and has the command of side A write the pictures of the flight.
-fn recorded(viewer: &mut Viewer, ui: &Ui) {
-    let (Some(path), Some(stage)) = (viewer.cameras.path(), viewer.stage.clone()) else { return };
-    let list = match viewer.cameras.write(&stage.source) {
-        Ok(list) => list,
-        Err(error) => {
-            viewer.trouble = Some(error.to_string());
-            return;
-        }
+/// Writes the list of cameras, and has the command of side A write the pictures of the flight. Returns the command, or why there is none.
+fn recorded(viewer: &mut Viewer) -> Result<String, String> {
+    let words = keys::for_sequence(viewer)?;
+    let (Some(path), Some(stage)) = (viewer.cameras.path(), viewer.stage.clone()) else {
+        return Err("a flight takes a scene and two kept cameras".into());
     };
+    let list = viewer.cameras.write(&stage.source).map_err(|error| error.to_string())?;
     let named = path::Named { list: list.display().to_string(), seconds: path.seconds };
-    if let Some(text) = keys::sequence(viewer, &named.to_string(), frames(path.end())) {
-        ui.ctx().copy_text(text);
-    }
+    Ok(keys::sequence(viewer, words, &named.to_string(), frames(path.end())))
 }
 
-/// Frames of a flight that takes so long, with one at its end.
+/// Frames of a flight that takes so long: the last one is at its end or later.
 fn frames(seconds: f64) -> u32 {
-    (seconds * FPS + 1e-6) as u32 + 1
+    (seconds * FPS - 1e-6).max(0.0).ceil() as u32 + 1
 }
 
 #[cfg(test)]
@@ -245,7 +249,7 @@ mod tests {
         let steps: Vec<f32> = std::iter::from_fn(|| cameras.fly_on(0.25)).map(|camera| camera.position.x).collect();
         assert!(steps.len() == 8 && steps.windows(2).all(|two| two[0] < two[1]), "{steps:?}");
         assert!((steps[7] - 4.0).abs() < 1e-5);
-        assert_eq!([frames(2.0), frames(0.2), frames(0.0)], [51, 6, 1]);
+        assert_eq!([frames(2.0), frames(0.05), frames(0.2), frames(0.0)], [51, 3, 6, 1]);
         let mut again = Cameras::default();
         again.keep_path(&cameras.path().unwrap());
         assert_eq!(again.path(), cameras.path());

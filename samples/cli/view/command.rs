@@ -205,6 +205,12 @@ pub fn on_path(words: Vec<String>, path: &str, frames: u32) -> Vec<String> {
             _ => out.push(word),
         }
     }
+    // The window's sun stands still, but that of a sequence would move with each frame.
+    if out.get(1).is_some_and(|technique| technique == "daylight")
+        && !out.iter().any(|word| word.starts_with("daylight.minutes="))
+    {
+        out.extend(["-D".to_owned(), "daylight.minutes=0".to_owned()]);
+    }
     out.extend(["--frames".to_owned(), format!("0..{frames}"), "--fps".to_owned(), "25".to_owned()]);
     out
 }

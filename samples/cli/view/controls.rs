@@ -93,6 +93,7 @@ fn camera(viewer: &mut Viewer, ui: &mut Ui) {
                 for (index, name) in names.iter().enumerate() {
                     let chosen = viewer.fly.is_none() && viewer.named_camera.is_none() && viewer.camera == index;
                     if ui.selectable_label(chosen, name).clicked() {
+                        viewer.cameras.land();
                         (viewer.camera, viewer.fly, viewer.named_camera) = (index, None, None);
                     }
                 }

@@ -1,7 +1,7 @@
 //! What comes from files and goes into them: scenes, bakes, cameras, pictures.
 
 use std::{
-    io::Read,
+    io::{Read, Seek},
     path::{Path, PathBuf},
     sync::{Arc, mpsc},
     time::Duration,
@@ -59,7 +59,8 @@ impl Viewer {
     /// Reads a scene on a thread of its own. A scene that is being read is dropped.
     pub(super) fn read(&mut self, args: StageArgs) {
         // From before the reading, so that no change of the file is missed.
-        let watch = args.scene.scene.clone().map(|file| Watch::start(file, self.wake.clone()));
+        let land = || args.scene.terrain.as_ref().map(|terrain| terrain.file().to_owned());
+        let watch = args.scene.scene.clone().or_else(land).map(|file| Watch::start(file, self.wake.clone()));
         let of_thread = args.clone();
         let read = self.on_thread(move || Stage::open(&of_thread));
         self.reading = read.map(|receiver| Reading { args, watch, receiver });
@@ -156,9 +157,12 @@ impl Viewer {
             }
             record::View::Path(path) => {
                 self.cameras.keep_path(path);
-                self.fly = Some(Fly::from_file(&path.at(args.time)));
+                // For R, in a scene that has no camera.
+                let fly = Fly::from_file(&path.at(args.time));
+                self.named_camera = Some((fly.placed(), fly.numbers()));
             }
         }
+        self.cameras.land();
         self.moved.clear();
         self.held = None;
         self.seconds = args.time;
@@ -183,6 +187,7 @@ impl Viewer {
                 let mut args = StageArgs { camera: None, camera_path: None, eye: None, ..self.newest_args() };
                 (args.scene.scene, args.scene.builtin, args.scene.unit) = (Some(file), None, None);
                 args.put = Vec::new();
+                args.scene.terrain = None;
                 // An environment of the command line stays, and one that was dropped.
                 args.turn = args.turn.filter(|_| args.environment.is_some());
                 (args.scene.add, args.scene.set, args.light, args.sun) = (Vec::new(), Vec::new(), Vec::new(), None);
@@ -229,10 +234,8 @@ impl Viewer {
             }
             Ok(Some(status)) => {
                 let mut said = String::new();
-                if let Some(errors) = &mut writing.child.stderr {
-                    // Without an answer the status says enough.
-                    let _ = errors.take(4096).read_to_string(&mut said);
-                }
+                // Without an answer the status says enough.
+                let _ = writing.said.rewind().and_then(|()| (&writing.said).take(1 << 16).read_to_string(&mut said));
                 let why = said.lines().last().map_or_else(|| status.to_string(), str::to_owned);
                 self.trouble = Some(format!("the picture was not written: {why}"));
                 self.writing = None;

@@ -121,6 +121,7 @@ pub fn pressed(viewer: &mut Viewer, context: &Context) {
         let next =
             if viewer.fly.is_some() || viewer.named_camera.is_some() { viewer.camera } else { viewer.camera + 1 };
         viewer.camera = next % stage.scene.cameras.len();
+        viewer.cameras.land();
         (viewer.fly, viewer.named_camera) = (None, None);
     }
     if hit(Key::K) {
@@ -246,36 +247,33 @@ pub fn screenshot(viewer: &mut Viewer, extension: &str) {
         }
     };
     let file = free(&stem(viewer), viewer.sides[0].technique, extension);
-    write(viewer, words, file);
+    write(viewer, words, file, false);
 }
 
-/// Has the command of side A write a sequence of pictures of a camera that flies, and returns the command; `None`: it said why not.
-pub fn sequence(viewer: &mut Viewer, path: &str, frames: u32) -> Option<String> {
+/// The command of side A for a sequence, or why there is none.
+pub fn for_sequence(viewer: &Viewer) -> Result<Vec<String>, String> {
     if viewer.writing.is_some() {
-        viewer.say("a picture is being written already");
-        return None;
+        return Err("a picture is being written already".into());
     }
-    let words = words(viewer).and_then(|words| {
-        if words.first().is_some_and(|word| word == "render") {
-            Ok(command::on_path(words, path, frames))
-        } else {
-            Err("the path tracer writes sequences with `lucerna reference`".to_owned())
-        }
-    });
-    match words {
-        Ok(words) => {
-            let base = free(&stem(viewer), "flight", "png");
-            let file = base.with_file_name(format!("{}-{{frame:04}}.png", base.file_stem()?.to_string_lossy()));
-            let output = ["-o".to_owned(), file.display().to_string()];
-            let text = format!("lucerna {}", command::quoted(&[&words[..], &output].concat()));
-            write(viewer, words, file);
-            Some(text)
-        }
-        Err(why) => {
-            viewer.say(format!("not written: {why}"));
-            None
-        }
+    let words = words(viewer)?;
+    if words.first().is_some_and(|word| word == "render") {
+        Ok(words)
+    } else {
+        Err("the path tracer writes single pictures; choose another technique for side A".into())
     }
+}
+
+/// Has a command of [`for_sequence`] write the pictures of a camera that flies along `path`, and returns the whole command.
+pub fn sequence(viewer: &mut Viewer, words: Vec<String>, path: &str, frames: u32) -> String {
+    let words = command::on_path(words, path, frames);
+    let stem = stem(viewer);
+    let name = |number: u32, frame: &str| PathBuf::from(format!("{stem}-flight-{number:03}-{frame}.png"));
+    let free = (1..10_000).find(|&number| !name(number, "0000").exists()).unwrap_or(10_000);
+    let file = name(free, "{frame:04}");
+    let output = ["-o".to_owned(), file.display().to_string()];
+    let text = format!("lucerna {}", command::quoted(&[&words[..], &output].concat()));
+    write(viewer, words, file, true);
+    text
 }
 
 fn stem(viewer: &Viewer) -> String {
@@ -283,15 +281,17 @@ fn stem(viewer: &Viewer) -> String {
     name.chars().map(|c| if c.is_alphanumeric() || "-_".contains(c) { c } else { '_' }).collect()
 }
 
-/// Starts a command that writes a file.
-fn write(viewer: &mut Viewer, words: Vec<String>, file: PathBuf) {
-    let started = std::env::current_exe().and_then(|program| {
-        Command::new(program).args(words).arg("-q").arg("-o").arg(&file).stderr(Stdio::piped()).spawn()
+/// Starts a command that writes a file, or a sequence of files.
+fn write(viewer: &mut Viewer, words: Vec<String>, file: PathBuf, sequence: bool) {
+    let started = tempfile::tempfile().and_then(|said| {
+        let mut command = Command::new(std::env::current_exe()?);
+        command.args(words).arg("-q").arg("-o").arg(&file).stdout(Stdio::null()).stderr(said.try_clone()?);
+        Ok((command.spawn()?, said))
     });
     match started {
-        Ok(child) => {
+        Ok((child, said)) => {
             viewer.say(format!("writing {}", file.display()));
-            viewer.writing = Some(Writing { file, child });
+            viewer.writing = Some(Writing { file, child, said, sequence });
         }
         Err(error) => viewer.trouble = Some(format!("the picture could not be written: {error}")),
     }

@@ -12,6 +12,7 @@ use crate::{
     console::{self, Console},
     default_light::{self, DefaultLight},
     source::SceneArgs,
+    terrain::Terrain,
 };
 
 /// Options of `lucerna views`.
@@ -74,7 +75,8 @@ pub fn run(args: &ViewsArgs, console: Console) -> Result<()> {
 
 fn list(scene: &lucerna::scene::Scene, args: &ViewsArgs) -> Result<ViewList> {
     let pose = Pose::playing(scene, 0.0);
-    let (named, stem) = match (&args.scene.builtin, &args.scene.scene) {
+    let land = args.scene.terrain.as_ref().map(Terrain::file);
+    let (named, stem) = match (&args.scene.builtin, args.scene.scene.as_deref().or(land)) {
         (Some(name), _) => (name.clone(), name.clone()),
         (None, Some(path)) => (path.to_string_lossy().into_owned(), stem(path)),
         (None, None) => return Err(Error::usage("no scene was given")),
