@@ -303,8 +303,11 @@ impl Grid {
 
     /// The change of the height at the middle of two ends, if it is a sample; infinite where triangles that reach so far from it cross the rim.
     fn own(&self, at: UVec2, reach: u32, a: UVec2, b: UVec2) -> f32 {
-        let crosses = |at: u32, last: u32| at.saturating_sub(reach) < last && last < at + reach;
-        if crosses(at.x, self.last.x) || crosses(at.y, self.last.y) {
+        // The two triangles beside a side along an axis meet at the side, which may lie on the rim.
+        let crosses = |at: u32, last: u32, along: bool| {
+            at.saturating_sub(reach) < last && last < at + reach && !(along && at == last)
+        };
+        if crosses(at.x, self.last.x, a.x == b.x) || crosses(at.y, self.last.y, a.y == b.y) {
             return f32::INFINITY;
         }
         if at.cmpgt(self.last).any() {
