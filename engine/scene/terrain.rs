@@ -178,7 +178,7 @@ pub fn add(scene: &mut Scene, map: &HeightMap, terrain: &Terrain, limits: &Limit
     let grid = Grid::of(averaged.as_ref().unwrap_or(map), terrain.height)?;
     let mut primitive = grid.triangles(terrain, size, limits)?;
     let reach = primitive.positions.iter().map(|place| place.abs().max_element()).fold(0.0, f32::max);
-    if !(reach <= extent::FARTHEST) {
+    if reach > extent::FARTHEST {
         return Err(too_far(reach));
     }
     primitive.material = scene.materials.len() as u32;
@@ -225,7 +225,7 @@ impl Grid {
             heights.extend((0..=squares).map(|x| height * row[x.min(last.x) as usize]));
         }
         // A difference of infinite heights is no number, which the errors would not tell.
-        if let Some(far) = heights.iter().find(|height| !(height.abs() <= extent::FARTHEST)) {
+        if let Some(far) = heights.iter().find(|height| !height.is_finite() || height.abs() > extent::FARTHEST) {
             return Err(too_far(*far));
         }
         errors.resize(line * line, 0.0);
