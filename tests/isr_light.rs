@@ -42,7 +42,7 @@ fn composing_is_equations_27_to_29() {
             let mut graph = Graph::new("compose");
             let mut g = gbuffer(&mut graph, &eye, &fine);
             // Every third pixel is as bright as a metal beyond a dielectric's 4 %.
-            let mirror = |i: usize| if i % 3 == 0 { dvec3(0.8, 0.5, 0.25) } else { DVec3::ZERO };
+            let mirror = |i: usize| if i.is_multiple_of(3) { dvec3(0.8, 0.5, 0.25) } else { DVec3::ZERO };
             let specular: Vec<[f32; 4]> =
                 (0..width * height).map(|i| (mirror(i) + 0.04).as_vec3().extend(1.0).to_array()).collect();
             g.specular = image(&mut graph, "specular", Extent::new(16, 8), &specular);

@@ -55,7 +55,7 @@ enum Command {
     /// Say what is in a scene, and what of it is not supported
     Inspect {
         #[command(flatten)]
-        scene: SceneArgs,
+        scene: Box<SceneArgs>,
         #[command(flatten)]
         talk: TalkArgs,
         /// Print one JSON document
