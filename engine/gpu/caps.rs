@@ -107,7 +107,8 @@ impl Caps {
             sampler_anisotropy: on(f.core.sampler_anisotropy).then_some(limits.max_sampler_anisotropy),
             geometry_shader: on(f.core.geometry_shader),
             shader_output_layer: on(f.v12.shader_output_layer),
-            multiview: on(f.v11.multiview),
+            multiview: on(f.v11.multiview)
+                && draws_all_views(&candidate.facts.driver_name, &candidate.facts.driver_info),
             image_cube_array: on(f.core.image_cube_array),
             ray_query: traced.by_query,
             ordered_rays: traced.ordered,
@@ -143,5 +144,25 @@ impl Caps {
                 accel_scratch_alignment: candidate.accel_scratch_alignment.max(1),
             },
         }
+    }
+}
+
+/// Whether a driver with multiview draws all triangles in all views. Mesa's lavapipe 22.3.6 (Debian 12) leaves large ones out of the second
+/// view, 25.0.7 does not. The versions between were not tried.
+fn draws_all_views(driver: &str, info: &str) -> bool {
+    let version = info.strip_prefix("Mesa ").and_then(|text| text.split('.').next()?.parse::<u32>().ok());
+    driver != "llvmpipe" || version.is_some_and(|version| version >= 25)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn old_lavapipe_has_no_multiview() {
+        assert!(!draws_all_views("llvmpipe", "Mesa 22.3.6 (LLVM 15.0.6)"));
+        assert!(!draws_all_views("llvmpipe", "of another form"));
+        assert!(draws_all_views("llvmpipe", "Mesa 25.0.7-2~bpo12+1 (LLVM 15.0.6)"));
+        assert!(draws_all_views("NVIDIA", "535.1"));
     }
 }
