@@ -52,7 +52,7 @@ impl Terrain {
     /// Usual numbers for a map, where none is given: one metre from sample to sample; a height of a tenth of the width, or of 1 m if the values are metres;
     /// an error of a thousandth of the difference between the highest and the lowest place.
     pub fn of(map: &HeightMap, width: Option<f32>, height: Option<f32>, error: Option<f32>) -> Self {
-        let width = width.unwrap_or((map.size.max_element() - 1) as f32);
+        let width = width.unwrap_or(map.size.max_element().saturating_sub(1) as f32);
         let height = height.unwrap_or(if map.metres { 1.0 } else { (0.1 * width).min(HIGHEST) });
         let most = map.values.iter().copied().fold(f32::MIN, f32::max);
         let least = map.values.iter().copied().fold(f32::MAX, f32::min);
@@ -95,24 +95,38 @@ impl HeightMap {
     }
 
     fn decode(bytes: &[u8], limits: &Limits) -> Result<(Self, Vec<Note>)> {
-        let (map, note) = match super::texture::luma(bytes, limits)? {
+        let (map, left_out) = match super::texture::luma(bytes, limits)? {
             Some((size, codes, color)) => {
                 let values = codes.into_iter().map(|code| f32::from(code) / f32::from(u16::MAX)).collect();
-                let note = color.then_some("colours of the height map; its heights are their luma");
-                (Self { size, values, metres: false }, note)
+                let left_out = color.then_some("colours of the height map are left out; its heights are their luma");
+                (Self { size, values, metres: false }, left_out)
             }
             None => Self::of_layers(&image::decode(bytes, limits)?)?,
         };
-        if map.size.min_element() < 2 {
-            let what = format!("{} × {} samples", map.size.x, map.size.y);
-            return Err(Error::input(what).help("A height map has at least two rows and two columns"));
-        }
+        map.check()?;
         if let Some(at) = map.values.iter().position(|value| !value.is_finite()) {
             let (x, y) = (at as u32 % map.size.x, at as u32 / map.size.x);
-            return Err(Error::input("is no finite number").at(format!("sample {x}, {y}")));
+            return Err(Error::input(format!("the value in column {x}, row {y} is no finite number")));
         }
-        let note = note.map(|text| Note { kind: NoteKind::Ignored, place: NAME.into(), text: text.into() });
-        Ok((map, note.into_iter().collect()))
+        let note = |kind, text: &str| Note { kind, place: NAME.into(), text: text.to_owned() };
+        let left_out = left_out.map(|text| note(NoteKind::Ignored, text));
+        let missing = super::texture::missing(bytes).map(|text| note(NoteKind::Repaired, text));
+        Ok((map, left_out.into_iter().chain(missing).collect()))
+    }
+
+    /// Whether there are two rows and two columns, and a value for each sample.
+    fn check(&self) -> Result<()> {
+        let wrong = |help: &str| {
+            let what = format!("{} × {} samples with {} values", self.size.x, self.size.y, self.values.len());
+            Err(Error::input(what).help(help))
+        };
+        if self.size.min_element() < 2 {
+            return wrong("A height map has at least two rows and two columns");
+        }
+        if u64::from(self.size.x) * u64::from(self.size.y) != self.values.len() as u64 {
+            return wrong("A height map has one value for each sample");
+        }
+        Ok(())
     }
 
     fn of_layers(picture: &Layers) -> Result<(Self, Option<&'static str>)> {
@@ -122,7 +136,7 @@ impl HeightMap {
         let grey = layer.data.chunks_exact(step).all(|all| all.iter().take(3).all(|one| *one == all[0]));
         let more = picture.layers.len() > 1 || !grey;
         let map = Self { size: uvec2(picture.width, picture.height), values, metres: true };
-        Ok((map, more.then_some("all channels of the height map but the first")))
+        Ok((map, more.then_some("all channels of the height map but the first are left out")))
     }
 
     /// The value at a place, samples from the upper left one, between four samples.
@@ -161,10 +175,11 @@ impl HeightMap {
 /// Adds a terrain to a scene as its last node. The top of the picture lies at −Z, its left edge at −X.
 ///
 /// # Errors
-/// `Usage` for numbers out of range, heights that are too large, and if the error needs more vertices than `limits` allow; `OutOfMemory` if there is no room
-/// for the grid.
+/// `Input` for a map with less than two rows or columns, or without a value for each sample; `Usage` for numbers out of range, heights that are too
+/// large, and if the error needs more vertices than `limits` allow; `OutOfMemory` if there is no room for the grid.
 pub fn add(scene: &mut Scene, map: &HeightMap, terrain: &Terrain, limits: &Limits) -> Result<()> {
     terrain.check()?;
+    map.check()?;
     let edges = (map.size - 1).as_vec2();
     let size = terrain.width * edges / edges.max_element();
     let averaged = (map.size.max_element() - 1 > MOST_SQUARES).then(|| map.averaged());

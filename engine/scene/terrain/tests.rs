@@ -165,6 +165,12 @@ fn numbers_out_of_range_are_refused_and_named() {
         let error = add(&mut Scene::default(), &far, &Terrain { height, ..usual }, &Limits::default()).unwrap_err();
         assert!(error.exit_code() == 2 && error.to_string().contains("too far"), "{error}");
     }
+    for (size, count) in [(uvec2(0, 0), 0), (uvec2(1, 9), 9), (uvec2(3, 3), 8)] {
+        let odd = HeightMap { size, values: vec![0.5; count], metres: false };
+        Terrain::of(&odd, None, None, None);
+        let error = add(&mut Scene::default(), &odd, &usual, &Limits::default()).unwrap_err();
+        assert!(error.exit_code() == 3 && error.to_string().contains("samples"), "{error}");
+    }
     let few = Limits { max_vertices: 9, ..Limits::default() };
     let error = add(&mut Scene::default(), &map, &Terrain { error: 0.0, ..usual }, &few).unwrap_err();
     assert!(error.to_string().contains("Allow a larger error"), "{error}");
@@ -196,7 +202,7 @@ fn pictures_are_read_with_all_their_bits() {
     assert_eq!(read(&pfm).unwrap().0.values, [1.0, 2.0, 3.0, -4.0]);
     let last = pfm.len() - 4;
     pfm[last..].copy_from_slice(&f32::NAN.to_le_bytes());
-    assert!(read(&pfm).unwrap_err().to_string().contains("no finite number"));
+    assert!(read(&pfm).unwrap_err().to_string().contains("row 0 is no finite number"));
     let error = read(&png(1, 4, png::ColorType::Grayscale, png::BitDepth::Eight, &[0; 4])).unwrap_err();
     assert!(error.to_string().contains("at least two rows"), "{error}");
     assert_eq!(read(b"not a picture").unwrap_err().exit_code(), 3);
