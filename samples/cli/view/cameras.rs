@@ -5,16 +5,13 @@ use std::path::{Path, PathBuf};
 use egui::Ui;
 use lucerna::{Error, ErrorKind, image};
 
-use super::{app::Viewer, fly::Fly, keys};
+use super::{app::Viewer, command::FPS, fly::Fly, keys};
 use crate::{
     camera::CameraFile,
     path::{self, CameraPath},
     record::Source,
     views::{NamedView, ViewList},
 };
-
-/// Frames a second of a sequence that is written.
-const FPS: f64 = 25.0;
 
 /// Kept cameras.
 #[derive(Debug)]
@@ -64,6 +61,11 @@ impl Cameras {
         let path = self.path();
         self.flight = path.as_ref().filter(|path| now < path.end()).map(|_| now);
         path.map(|path| path.at(now))
+    }
+
+    /// Begins a flight, or ends it.
+    fn toggle(&mut self) {
+        self.flight = if self.flight.is_some() { None } else { Some(0.0) };
     }
 
     /// Ends the flight.
@@ -132,7 +134,7 @@ pub fn fly(viewer: &mut Viewer) {
     if viewer.cameras.path().is_none() {
         viewer.say("a flight takes two kept cameras (K)");
     } else {
-        viewer.cameras.flight = viewer.cameras.flight.map_or(Some(0.0), |_| None);
+        viewer.cameras.toggle();
     }
 }
 
@@ -184,7 +186,7 @@ fn flight(viewer: &mut Viewer, ui: &mut Ui) {
         let cameras = &mut viewer.cameras;
         let button = ui.button(if cameras.flight.is_some() { "⏹ Fly" } else { "▶ Fly" });
         if button.on_hover_text("Fly through the cameras of the list (G)").clicked() {
-            cameras.flight = cameras.flight.map_or(Some(0.0), |_| None);
+            cameras.toggle();
         }
         let seconds = egui::DragValue::new(&mut cameras.seconds).speed(0.05).range(0.05..=600.0).suffix(" s");
         ui.add(seconds.clamp_existing_to_range(false)).on_hover_text("From each camera to the next");

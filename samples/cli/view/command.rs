@@ -188,6 +188,9 @@ fn scene(common: &Common<'_>, technique: &str, say: &mut impl FnMut(&[&str])) {
     }
 }
 
+/// Frames a second of a sequence that is written.
+pub const FPS: f64 = 25.0;
+
 /// The command of a sequence in the place of that of a picture: the camera flies along a path. `path`: as `--camera-path` has it.
 pub fn on_path(words: Vec<String>, path: &str, frames: u32) -> Vec<String> {
     let mut out = Vec::new();
@@ -211,7 +214,7 @@ pub fn on_path(words: Vec<String>, path: &str, frames: u32) -> Vec<String> {
     {
         out.extend(["-D".to_owned(), "daylight.minutes=0".to_owned()]);
     }
-    out.extend(["--frames".to_owned(), format!("0..{frames}"), "--fps".to_owned(), "25".to_owned()]);
+    out.extend(["--frames".to_owned(), format!("0..{frames}"), "--fps".to_owned(), FPS.to_string()]);
     out
 }
 
@@ -226,6 +229,22 @@ pub fn quoted(words: &[String]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_sequence_has_the_path_in_the_place_of_camera_and_time_and_a_sun_that_stands_still() {
+        let words = |text: &str| -> Vec<String> { text.split(' ').map(str::to_owned).collect() };
+        let flown = |text: &str| on_path(words(text), "l.toml,2", 51).join(" ");
+        assert_eq!(
+            flown("render isr a.glb --camera 1,2,3,4,5,6 --time 0.5 --aa 8"),
+            "render isr a.glb --camera-path l.toml,2 --aa 8 --frames 0..51 --fps 25"
+        );
+        assert_eq!(
+            flown("render daylight a.glb --camera 0 --scene-time 1 --bake a.day"),
+            "render daylight a.glb --camera-path l.toml,2 --bake a.day -D daylight.minutes=0 --frames 0..51 --fps 25"
+        );
+        let moving = "render daylight a.glb --camera 0 -D daylight.minutes=10";
+        assert!(!flown(moving).contains("minutes=0 ") && flown(moving).contains("minutes=10"));
+    }
 
     /// The program reads the command of each technique in each mode, for light, a layer and an image.
     #[test]
