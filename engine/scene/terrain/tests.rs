@@ -196,6 +196,14 @@ fn pictures_are_read_with_all_their_bits() {
     assert_eq!(found.values, [0.0, 1.0 / 255.0, 128.0 / 255.0, 1.0]);
     let (_, notes) = read(&png(2, 2, png::ColorType::Rgb, png::BitDepth::Eight, &[9; 12])).unwrap();
     assert!(notes[0].text.contains("luma"), "{}", notes[0].text);
+    // A photograph that ends too early is read, and named.
+    let (mut jpeg, grey) = (Vec::new(), (0..64 * 64).map(|i| (i % 64 * 4) as u8).collect::<Vec<_>>());
+    let mut encoder = ::image::codecs::jpeg::JpegEncoder::new(&mut jpeg);
+    encoder.encode(&grey, 64, 64, ::image::ExtendedColorType::L8).unwrap();
+    assert!(read(&jpeg).unwrap().1.is_empty());
+    let (found, notes) = read(&jpeg[..jpeg.len() * 3 / 4]).unwrap();
+    assert_eq!((found.values.len(), notes.len(), notes[0].kind), (64 * 64, 1, NoteKind::Repaired));
+    assert!(notes[0].text.contains("the JPEG ends before"), "{}", notes[0].text);
     // Floating-point numbers are as they are.
     let mut pfm = b"Pf\n2 2\n-1.0\n".to_vec();
     pfm.extend([3.0f32, -4.0, 1.0, 2.0].iter().flat_map(|value| value.to_le_bytes()));
