@@ -1,7 +1,7 @@
 //! What the OBJ reader makes of each feature, on small files made here.
 
 use glam::{Vec2, Vec3, Vec4};
-use lucerna::scene::{AlphaMode, LoadOptions, Primitive, Scene, Wrap, load};
+use lucerna::scene::{AlphaMode, LoadOptions, NoteKind, Primitive, Scene, Wrap, load};
 
 /// Loads `text` as `a.obj`, with other files beside it.
 fn read(text: &str, files: &[(&str, &[u8])]) -> lucerna::Result<Scene> {
@@ -147,11 +147,12 @@ fn a_cut_jpeg_is_told_of() {
         let scene = read(&text, &[("a.mtl", b"newmtl m\nmap_Kd a.jpg\n"), ("a.jpg", bytes)]).unwrap();
         assert_eq!(scene.textures.len(), 1);
         let of_textures = |note: &lucerna::scene::Note| note.place.starts_with("texture");
-        scene.notes.into_iter().filter(of_textures).map(|note| (note.place, note.text)).collect::<Vec<_>>()
+        scene.notes.into_iter().filter(of_textures).map(|note| (note.kind, note.place, note.text)).collect::<Vec<_>>()
     };
-    let cut = "the JPEG ends before its picture does; what is missing is grey";
+    let cut = "the JPEG ends before its picture does; the rest is grey";
     assert_eq!(notes(&jpeg), []);
-    assert_eq!(notes(&jpeg[..2 * jpeg.len() / 3]), [(r#"texture "a.jpg""#.to_owned(), cut.to_owned())]);
+    let told = [(NoteKind::Approximated, r#"texture "a.jpg""#.to_owned(), cut.to_owned())];
+    assert_eq!(notes(&jpeg[..2 * jpeg.len() / 3]), told);
 }
 
 /// A tetrahedron around (x, 0.3, 0.3) with its fronts outwards, or inwards; its corners are the next four.

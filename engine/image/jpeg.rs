@@ -124,7 +124,7 @@ pub(super) fn decode(bytes: &[u8], limits: &Limits) -> Result<Layers> {
     let metadata = metadata(bytes).unwrap_or_default();
     let mut warnings: Vec<String> = encoding::profile_warning(profile.as_deref()).into_iter().collect();
     if is_cut(bytes) {
-        warnings.push("the file ends before its picture does; what is missing is grey".into());
+        warnings.push("the file ends before its picture does; the rest is grey".into());
     }
     Ok(Layers { metadata, warnings, ..Layers::new(width, height).with(Layer::new("", &["R", "G", "B"], data)) })
 }
@@ -146,7 +146,7 @@ mod tests {
         let more = decode(&[&file[..], b"maker's notes"].concat(), &Limits::default()).unwrap();
         assert_eq!(more, whole);
         let cut = decode(&file[..file.len() * 3 / 4], &Limits::default()).unwrap();
-        assert_eq!(cut.warnings, ["the file ends before its picture does; what is missing is grey"]);
+        assert_eq!(cut.warnings, ["the file ends before its picture does; the rest is grey"]);
     }
 
     #[test]

@@ -110,7 +110,7 @@ impl HeightMap {
         }
         let note = |kind, text: &str| Note { kind, place: NAME.into(), text: text.to_owned() };
         let left_out = left_out.map(|text| note(NoteKind::Ignored, text));
-        let missing = super::texture::missing(bytes).map(|text| note(NoteKind::Repaired, text));
+        let missing = super::texture::missing(bytes).map(|text| note(NoteKind::Approximated, text));
         Ok((map, left_out.into_iter().chain(missing).collect()))
     }
 

@@ -46,10 +46,10 @@ pub fn decode(bytes: &[u8], mime_hint: Option<&str>, limits: &Limits) -> Result<
     }
 }
 
-/// What is missing from an image that [`decode`] reads nevertheless.
+/// Words for a part of the picture that is not in its bytes, although [`decode`] reads them.
 pub(crate) fn missing(bytes: &[u8]) -> Option<&'static str> {
     (Format::sniff(bytes) == Some(Format::Jpeg) && crate::image::jpeg::is_cut(bytes))
-        .then_some("the JPEG ends before its picture does; what is missing is grey")
+        .then_some("the JPEG ends before its picture does; the rest is grey")
 }
 
 /// Bytes that a texture takes on the device as 8-bit RGBA: the base level and, with `mips`, all levels below it.

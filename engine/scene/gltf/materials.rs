@@ -172,7 +172,7 @@ impl Materials<'_> {
                 let here = format!("images[{image}]");
                 let (decoded, missing) = self.decode(&document.images[image as usize], &here)?;
                 if let Some(missing) = missing {
-                    self.notes.repaired(&here, missing);
+                    self.notes.approximated(&here, missing);
                 }
                 self.budget.texture(decoded.rgba.len() as u64).map_err(|error| error.at(&here))?;
                 self.textures.push(decoded);

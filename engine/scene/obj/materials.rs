@@ -170,7 +170,7 @@ impl Textures<'_> {
         };
         let mut texture = decode().map_err(|error: Error| error.in_file(path))?;
         if let Some(missing) = texture::missing(&bytes) {
-            self.notes.repaired(format!("texture {:?}", texture.name), missing);
+            self.notes.approximated(format!("texture {:?}", texture.name), missing);
         }
         if let Some(bumps) = bumps.filter(|_| holds_heights(&texture)) {
             texture = normals_of(&texture, bumps);

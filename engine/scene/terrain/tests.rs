@@ -202,7 +202,7 @@ fn pictures_are_read_with_all_their_bits() {
     encoder.encode(&grey, 64, 64, ::image::ExtendedColorType::L8).unwrap();
     assert!(read(&jpeg).unwrap().1.is_empty());
     let (found, notes) = read(&jpeg[..jpeg.len() * 3 / 4]).unwrap();
-    assert_eq!((found.values.len(), notes.len(), notes[0].kind), (64 * 64, 1, NoteKind::Repaired));
+    assert_eq!((found.values.len(), notes.len(), notes[0].kind), (64 * 64, 1, NoteKind::Approximated));
     assert!(notes[0].text.contains("the JPEG ends before"), "{}", notes[0].text);
     // Floating-point numbers are as they are.
     let mut pfm = b"Pf\n2 2\n-1.0\n".to_vec();
