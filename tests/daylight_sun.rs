@@ -18,7 +18,7 @@ fn a_sun_at_a_distance_has_the_light_of_a_point_light_there() {
     with_gpu(|gpu| {
         let (scene, view) = (stage(), eye());
         let point = SunPoint { centre: [0.0, 1.0, 0.0], distance: 5.0 };
-        let mut plan = plan(&scene, &view, Baking { samples: 192, ..baking() });
+        let mut plan = plan(&scene, &view, Baking { samples: 384, ..baking() });
         plan.calendar.point = Some(point);
         plan.times.remove(1);
         plan.validate().unwrap();

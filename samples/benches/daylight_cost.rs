@@ -1,6 +1,7 @@
-//! What the indirect light of a day costs: one table with three ways to the same error. *One by one*: the path tracer
+//! What the indirect light of a day costs: one table with four ways to the same error. *One by one*: the path tracer
 //! renders each lit frame. *Adaptive*: it renders the frames that the paper's test needs. *Shared*: one set of paths
-//! serves all times, with an exact shadow ray for each vertex and time (`daylight bake`).
+//! serves all times, with an exact shadow ray for each vertex and time (`daylight bake`), or with sun masks at points
+//! [`MASKS`] metres apart (`bake.sun_masks`), whose points are part of the time.
 //!
 //! `cargo bench -p lucerna-samples --bench daylight_cost [-- WIDTHxHEIGHT [SAMPLES [SCENE]]]`; 48x36, 64 and hall by
 //! default; SAMPLES: paths of a pixel of the shared way; SCENE: a built-in scene, seen by its first camera.
@@ -37,6 +38,10 @@ const MEASURED: usize = 12;
 const MOST: u32 = 1 << 14;
 /// The goal: the shared way costs at most this share of rendering frames one by one.
 const GOAL: f64 = 1.0 / 20.0;
+/// The same with masks.
+const MASKS_GOAL: f64 = 1.0 / 50.0;
+/// Distance of the points of sun masks, metres.
+const MASKS: f32 = 0.25;
 
 fn main() -> std::process::ExitCode {
     common::end(run())
@@ -215,6 +220,23 @@ fn worst(all: &[f64]) -> f64 {
     all.iter().copied().fold(0.0, f64::max)
 }
 
+/// What masks change whatever the seed, relative to the mean: the ratio of the light, and the root mean square of the
+/// difference. Noise of the two seeds is independent, so that the mean product of their differences has none.
+fn bias(exact: [&[Vec<f32>]; 2], masks: [&[Vec<f32>]; 2]) -> (f64, f64) {
+    let (mut square, mut sums, mut count) = (0.0, [0.0; 2], 0.0);
+    for time in 0..exact[0].len() {
+        for at in 0..exact[0][time].len() {
+            let [e1, e2, m1, m2] = [exact[0], exact[1], masks[0], masks[1]].map(|frames| f64::from(frames[time][at]));
+            square += (m1 - e1) * (m2 - e2);
+            sums[0] += 0.5 * (e1 + e2);
+            sums[1] += 0.5 * (m1 + m2);
+            count += 1.0;
+        }
+    }
+    let square: f64 = square;
+    (sums[1] / sums[0], (square.max(0.0) / count).sqrt() / (sums[0] / count))
+}
+
 fn no_layer() -> Error {
     Error::new(ErrorKind::Runtime, "the path tracer has no layer of this name")
 }
@@ -286,6 +308,11 @@ fn run() -> Result<()> {
     let (a, spent) = shared(&gpu, &scene, &view, &first, &albedo)?;
     let (b, _) = shared(&gpu, &scene, &view, &second, &albedo)?;
     let lit = first.times.len();
+    let masked = |plan: &Plan| Plan { settings: Baking { sun_masks: MASKS, ..plan.settings.clone() }, ..plan.clone() };
+    let few = |plan: &Plan| Plan { settings: Baking { samples: 2, ..plan.settings.clone() }, ..plan.clone() };
+    shared(&gpu, &scene, &view, &masked(&few(&first)), &albedo)?;
+    let (a_masks, of_masks) = shared(&gpu, &scene, &view, &masked(&first), &albedo)?;
+    let (b_masks, _) = shared(&gpu, &scene, &view, &masked(&second), &albedo)?;
     let of_shared: Vec<f64> = a.iter().zip(&b).map(|(a, b)| noise(a, b)).map(|(noise, mean)| noise / mean).collect();
     let [paths, compression] = spent;
     println!("{lit} lit frames of {}; shared: {samples} paths a pixel", first.steps);
@@ -300,6 +327,15 @@ fn run() -> Result<()> {
         "noise of the shared way: mean over times {:.1} %, worst {:.1} %",
         100.0 * mean(&of_shared),
         100.0 * worst(&of_shared)
+    );
+    let masks_noise: Vec<f64> =
+        a_masks.iter().zip(&b_masks).map(|(a, b)| noise(a, b)).map(|(noise, mean)| noise / mean).collect();
+    let (energy, off) = bias([&a, &b], [&a_masks, &b_masks]);
+    println!(
+        "masks, points {MASKS} m apart: noise {:.1} %, worst {:.1} %; light {energy:.4} of exact; off by {:.2} % (root mean square over all times)",
+        100.0 * mean(&masks_noise),
+        100.0 * worst(&masks_noise),
+        100.0 * off
     );
     println!("\n{:>9} {:>13} {:>13} {:>13} {:>14}", "time", "shared, %", "tracer, %", "paths a pixel", "seconds equal");
     let civil = day.day()?;
@@ -330,7 +366,7 @@ fn run() -> Result<()> {
     };
     let kept = needed(&(0..lit).map(coloured).collect::<Result<Vec<_>>>()?)?;
     let all = paths.seconds() + compression.seconds();
-    println!("\n{:<58} {:>9} {:>11} {:>8} {:>9}", "indirect light of the day", "frames", "seconds", "±", "shared is");
+    println!("\n{:<58} {:>9} {:>11} {:>8} {:>9}", "indirect light of the day", "frames", "seconds", "±", "of each");
     let row = |what: &str, frames: usize, (mean, deviation): (f64, f64)| {
         let seconds = mean * frames as f64;
         println!(
@@ -344,10 +380,18 @@ fn run() -> Result<()> {
     row("one by one, as many paths in each, equal mean noise", lit, alike(&curves, mean(&there), mean));
     row("one by one, as many paths in each, equal worst noise", lit, alike(&curves, worst(&there), worst));
     row("adaptive (paper's test), noise at each time", kept.len(), at_each);
-    println!("{:<58} {lit:>9} {:>11.1}", "shared paths, exact shadow rays", paths.seconds());
-    println!("{:<58} {lit:>9} {all:>11.1}", "the same with compression");
-    let verdict = if paths.seconds() <= GOAL * each { "reached" } else { "missed" };
-    println!("\ngoal, at most 1/{:.0} of one by one at the noise of each time: {verdict}", 1.0 / GOAL);
+    let row_of = |what: &str, seconds: f64| {
+        println!("{what:<58} {lit:>9} {seconds:>11.1} {:>8} {:>9}", "", format!("1/{:.1}", each / seconds));
+    };
+    row_of("shared paths, exact shadow rays", paths.seconds());
+    row_of("the same with compression", all);
+    let [masks, masks_compression] = of_masks;
+    row_of("shared paths, sun masks", masks.seconds());
+    row_of("the same with compression", masks.seconds() + masks_compression.seconds());
+    for (goal, spent, what) in [(GOAL, paths, "exact shadow rays"), (MASKS_GOAL, masks, "sun masks")] {
+        let verdict = if spent.seconds() <= goal * each { "reached" } else { "missed" };
+        println!("goal with {what}, at most 1/{:.0} of one by one at the noise of each time: {verdict}", 1.0 / goal);
+    }
     println!(
         "seconds are of the processor where the system tells them; ±: standard error over the {} times",
         curves.len()

@@ -26,6 +26,7 @@ struct DaySettings {
     uint lights;          // of the scene
     uint groups;          // of lamps
     float sun_radius;     // tangent of the angular radius of the sun's disc
+    uint mask_words;      // of 32 times each for a cell of the sun masks; 0: there are no masks
 };
 
 // A surface point of a path that reflects direct light.
@@ -34,6 +35,36 @@ struct DayVertex {
     vec3 normal;     // shading normal, unit
     vec3 geometric;  // of the triangle, unit, on the side of the normal
     vec3 weight;     // irradiance at the receiver for each W/m² of irradiance at the vertex
+    float sun;       // factor on the light of the sun: 1 / the probability with which the vertex asks for it; 0: it does not ask
+    uint cell;       // of the sun masks, if there are any (daylight/masks.glsl)
+};
+
+// The cells of a triangle for which the sun masks have a bit for each time. A grid of columns along the longest side and of rows to the corner
+// opposite to it. Twin: techniques::daylight::masks::Cells.
+struct DayCells {
+    uint first;   // number of the first cell
+    uint size;    // bits 0 to 14: columns; 15 to 29: rows; 30 and 31: the corner at which the longest side begins
+    float foot;   // of the height on the longest side, as a share of that side
+};
+
+// Invocations of a group that chooses points, and most groups of a row of those that trace their rays.
+const uint DAY_MASK_GROUP = 64u;
+const uint DAY_MASK_ROW = 32768u;
+
+// The masks that the paths of a batch ask for.
+struct DayAsks {
+    uvec3 point_groups;  // that choose the points
+    uvec3 ray_groups;    // rows of points, times and rows
+    uint count;          // of sides of cells
+};
+
+// The point for which a mask has its bits.
+struct DayMaskPoint {
+    vec3 position;  // moved off the surface
+    vec3 normal;    // of the triangle, unit, on the side of the mask
+    vec2 disc;      // the place on the disc of the sun
+    uint salt;
+    uint cell;
 };
 
 // The end of a path that left the scene.

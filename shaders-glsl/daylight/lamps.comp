@@ -40,7 +40,7 @@ void main() {
     uint receiver = gl_GlobalInvocationID.x;
     if (receiver >= settings.receivers) return;
     DaySpot spot = spots[receiver];
-    DayVertex start = DayVertex(spot.above, spot.shading, spot.normal, vec3(1.0));
+    DayVertex start = DayVertex(spot.above, spot.shading, spot.normal, vec3(1.0), 0.0, 0u);
     for (uint i = first; i < first + count; ++i) {
         uint path = receiver * settings.samples + i;
         uint number = settings.first_sample + i;

@@ -46,7 +46,7 @@ void main() {
         uint number = settings.first_sample + i;
         for (uint k = 0u; k <= counts[path]; ++k) {
             // The first part of a path is the probe itself: any direction is as good as another.
-            DayVertex vertex = DayVertex(probes[receiver], vec3(0.0), vec3(0.0), vec3(1.0));
+            DayVertex vertex = DayVertex(probes[receiver], vec3(0.0), vec3(0.0), vec3(1.0), 0.0, 0u);
             if (k > 0u) vertex = vertices[path * DAY_VERTICES + k - 1u];
             uvec4 hash = pcg4d(uvec4(settings.first_receiver + receiver, number, k, settings.seed ^ 0x2545f491u));
             DayLamp lamp;

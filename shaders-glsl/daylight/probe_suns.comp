@@ -21,6 +21,10 @@ layout(binding = 11, scalar) readonly buffer Counts { uint counts[]; };
 // each probe.
 layout(binding = 12, scalar) buffer Sums { vec3 sums[]; };
 
+// A bit for each cell and time: whether the sun is seen from there.
+layout(binding = 15, scalar) readonly buffer Bits { uint bits[]; };
+
+#include "daylight/sun_ray.glsl"
 #include "daylight/sun.glsl"
 
 layout(push_constant, scalar) uniform Push {
@@ -37,7 +41,7 @@ void main() {
     for (uint i = first; i < first + count; ++i) {
         uint path = receiver * settings.samples + i;
         uint number = settings.first_sample + i;
-        vec3 light = day_sun(path, settings.first_receiver + receiver, number, sun, around);
+        vec3 light = day_sun(path, settings.first_receiver + receiver, number, time, sun, around);
         if (light == vec3(0.0)) continue;
         float terms[PROBE_TERMS] = probe_harmonics(starts[path].direction);
         uint at = PROBE_TERMS * (2u * (receiver * settings.times + time) + (number & 1u));

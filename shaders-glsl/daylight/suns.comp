@@ -1,5 +1,5 @@
-// Light of the sun at all times of the day: a shadow ray from each vertex to each position of the sun. Invocations side by side have the same
-// vertex and neighbouring times, so that their rays stay together.
+// Light of the sun at all times of the day: a shadow ray from each vertex to each position of the sun, or the bit of a mask. Invocations side by
+// side have the same vertex and neighbouring times, so that their rays stay together.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
@@ -21,6 +21,10 @@ layout(binding = 11, scalar) readonly buffer Counts { uint counts[]; };
 // shows the noise.
 layout(binding = 12, scalar) buffer Sums { vec3 sums[]; };
 
+// A bit for each cell and time: whether the sun is seen from there.
+layout(binding = 15, scalar) readonly buffer Bits { uint bits[]; };
+
+#include "daylight/sun_ray.glsl"
 #include "daylight/sun.glsl"
 
 layout(push_constant, scalar) uniform Push {
@@ -38,7 +42,7 @@ void main() {
     for (uint i = first; i < first + count; ++i) {
         uint path = receiver * settings.samples + i;
         uint number = settings.first_sample + i;
-        vec3 of_path = day_sun(path, settings.first_receiver + receiver, number, sun, around);
+        vec3 of_path = day_sun(path, settings.first_receiver + receiver, number, time, sun, around);
         if ((number & 1u) != 0u) odd += of_path;
         else even += of_path;
     }

@@ -13,6 +13,7 @@ struct DaySurface {
     float gap;
     bool thin;
     bool unlit;
+    bool front;      // of the triangle
     bool inside;     // the ray hits the back of a surface that has only one side
 };
 
@@ -25,6 +26,7 @@ DaySurface day_surface(uint instance, uint triangle, vec2 barycentrics, vec3 tow
     vec3 geometric = normalize(point.area);
     bool front = dot(geometric, toward) < 0.0;
     s.position = point.position;
+    s.front = front;
     s.side = front ? geometric : -geometric;
     s.gap = surface_gap(point);
     s.thin = (flags & MATERIAL_DOUBLE_SIDED) != 0u;

@@ -28,6 +28,30 @@ layout(binding = 14, scalar) writeonly buffer Spots { DaySpot spots[]; };
 layout(binding = 9, scalar) writeonly buffer Vertices { DayVertex vertices[]; };
 layout(binding = 10, scalar) writeonly buffer Escapes { DayEscape escapes[]; };
 layout(binding = 11, scalar) writeonly buffer Counts { uint counts[]; };
+layout(binding = 15, scalar) readonly buffer Cells { DayCells cells[]; };
+layout(binding = 16, scalar) readonly buffer CellFirsts { uint cell_firsts[]; };
+// Two bits for each cell: whether the masks of its front and of its back are there, or asked for.
+layout(binding = 17, scalar) buffer Known { uint known[]; };
+// Twice the number of a cell, and 1 for its back: those that are new.
+layout(binding = 18, scalar) writeonly buffer Wanted { uint wanted[]; };
+layout(binding = 19, scalar) buffer Asks { DayAsks asks; };
+
+#include "daylight/masks.glsl"
+
+// The sun is asked for with a probability of 1 by vertices that carry at least this share of the light of the first vertex of their path. A
+// vertex costs a ray for each time of the day, and late vertices carry little.
+const float DAY_ASK = 0.5;
+
+// Asks for the mask of a side of a cell if it is not there.
+void want_mask(uint side) {
+    uint bit = 1u << (side & 31u);
+    if ((known[side >> 5u] & bit) != 0u || (atomicOr(known[side >> 5u], bit) & bit) != 0u) return;
+    uint at = atomicAdd(asks.count, 1u);
+    wanted[at] = side;
+    atomicMax(asks.point_groups.x, at / DAY_MASK_GROUP + 1u);
+    atomicMax(asks.ray_groups.x, min(at + 1u, DAY_MASK_ROW));
+    atomicMax(asks.ray_groups.z, at / DAY_MASK_ROW + 1u);
+}
 
 void main() {
     uint path = gl_GlobalInvocationID.x;
@@ -63,6 +87,7 @@ void main() {
         bool alive = dot(direction, s.side) > 0.0;
 #endif
         uint sharp = 0u;
+        float leading = 0.0;
         for (uint surface = 1u; alive; ++surface) {
             uint salt = pcg4d(uvec4(of_bake, number, surface, settings.seed)).x;
             Hit hit = trace(Ray(origin, 0.0, direction, 1e30), TRACE_SHADOW, salt, false);
@@ -107,10 +132,20 @@ void main() {
                 continue;
             }
             weight *= s.albedo;
-            vertices[path * DAY_VERTICES + count] = DayVertex(above, s.normal, s.side, weight / SAMPLING_PI);
+            float largest = brightest(weight) / SAMPLING_PI;
+            if (count == 0u) leading = largest;
+            float sun = 1.0;
+            uint cell = 0u;
+            if (settings.mask_words != 0u) {
+                cell = day_cell(hit.instance, hit.triangle, hit.barycentrics);
+                want_mask(2u * cell + (s.front ? 0u : 1u));
+            } else if (largest < DAY_ASK * leading) {
+                float ask = largest / (DAY_ASK * leading);
+                sun = unit_float(pcg4d(uvec4(salt, 5u, 6u, 7u)).x) < ask ? 1.0 / ask : 0.0;
+            }
+            vertices[path * DAY_VERTICES + count] = DayVertex(above, s.normal, s.side, weight / SAMPLING_PI, sun, cell);
             ++count;
             if (count >= settings.bounces) break;
-            float largest = brightest(weight) / SAMPLING_PI;
             if (count > settings.roulette && largest < 0.25) {
                 float stay = 4.0 * largest;
                 if (unit_float(pcg4d(uvec4(salt, 1u, 2u, 3u)).x) >= stay) break;

@@ -19,6 +19,8 @@ mod daylight_frames;
 mod daylight_lamps;
 #[path = "../daylight_light.rs"]
 mod daylight_light;
+#[path = "../daylight_masks.rs"]
+mod daylight_masks;
 #[path = "../daylight_probes.rs"]
 mod daylight_probes;
 #[path = "../daylight_sequence.rs"]

@@ -38,7 +38,7 @@ pub struct Unwrapped {
 }
 
 /// The primitives of a scene in the order of [`crate::resident::Moment::instances`], each with its node.
-fn placed(scene: &Scene) -> impl Iterator<Item = (usize, usize, usize, &Primitive)> {
+pub(super) fn placed(scene: &Scene) -> impl Iterator<Item = (usize, usize, usize, &Primitive)> {
     scene.nodes.iter().enumerate().filter_map(|(node, of)| Some((node, of.mesh? as usize))).flat_map(|(node, mesh)| {
         let primitives = scene.meshes.get(mesh).map_or(&[][..], |mesh| &mesh.primitives);
         let there = |(_, primitive): &(usize, &Primitive)| scene.materials.len() > primitive.material as usize;

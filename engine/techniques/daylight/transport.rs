@@ -10,13 +10,15 @@ use super::{
     beam::SUN_ANGULAR_RADIUS,
     columns::Measured,
     gathered::Spot,
+    masks::Masks,
+    suns::{sun_items, suns_of},
 };
 use glam::Vec3;
 
 use crate::{
     Result,
     gpu::{BufferDesc, Gpu, OwnedBuffer},
-    graph::{Graph, Items, Runner},
+    graph::{Frame, Graph, Items, Runner},
     rays::{Rays, traced},
     resident::Resident,
     scene::{Pose, Scene, View},
@@ -37,7 +39,7 @@ const BATCH: u32 = 16;
 pub(super) const LAMP_TURNS: u64 = 64;
 /// Texels of [`Transport::sparse`], about.
 const SPARSE: usize = 2048;
-/// Vertices of a batch at most: 100 MB, because every device allows buffers of 128 MiB.
+/// Vertices of a batch at most: 118 MB, because every device allows buffers of 128 MiB.
 const MOST_VERTICES: u64 = 1 << 21;
 
 /// The scene of a bake on a device.
@@ -50,6 +52,7 @@ pub struct Transport {
     pub(super) resident: Resident,
     pub(super) rays: Rays,
     pub(super) suns: OwnedBuffer,
+    pub(super) masks: Masks,
     /// The lamps that are sampled, made for the first tile.
     pub(super) lamps: Option<LightTable>,
     /// The group of each light, and of each material.
@@ -102,7 +105,7 @@ impl Transport {
     /// Uploads the scene without its own suns and sky.
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits; `Usage` as [`super::Cells::new`].
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, sources: Sources) -> Result<Self> {
         let (scene, groups) = with_lamps(scene, &plan.lamps);
         let pose = Pose::rest(&scene);
@@ -110,6 +113,7 @@ impl Transport {
         let groups = OwnedBuffer::with_contents(gpu, "daylight.groups", bytemuck::cast_slice(&groups))?;
         let rays = Rays::new(gpu, &scene, &resident)?;
         let suns = suns_of(gpu, plan)?;
+        let masks = Masks::new(gpu, &scene, plan)?;
         Ok(Self {
             gpu: gpu.clone(),
             runner: Runner::new(gpu),
@@ -118,6 +122,7 @@ impl Transport {
             resident,
             rays,
             suns,
+            masks,
             lamps: None,
             groups,
             sources,
@@ -191,7 +196,9 @@ impl Transport {
                 (hits, mask, Some(extent))
             }
         };
-        let settings = Baking { samples: plan.settings.samples.min(SPARSE_PATHS), ..plan.settings.clone() };
+        // Few paths need fewer shadow rays than masks.
+        let samples = plan.settings.samples.min(SPARSE_PATHS);
+        let settings = Baking { samples, sun_masks: 0.0, ..plan.settings.clone() };
         let light = self.gather(&Plan { settings, lamps: Vec::new(), ..plan.clone() }, 0, &hits)?;
         Ok(Sparse { light: Light { mask, ..light }, extent })
     }
@@ -202,6 +209,7 @@ impl Transport {
     /// `OutOfMemory`, `DeviceLost`.
     pub fn follow(&mut self, plan: &Plan) -> Result<()> {
         self.suns = suns_of(&self.gpu, plan)?;
+        self.masks = Masks::new(&self.gpu, &self.scene, plan)?;
         Ok(())
     }
 
@@ -250,6 +258,14 @@ impl Transport {
         Ok(self.runner.run(&graph)?.buffer(read))
     }
 
+    /// Runs passes that may compute masks.
+    pub(super) fn run(&mut self, graph: &Graph) -> Result<Frame> {
+        let done = self.runner.run(graph);
+        // After a run that ended early, masks are known that were not computed.
+        self.masks.unclear = done.is_err();
+        done
+    }
+
     /// The light of some surface points; `first`: number of the first in the whole bake.
     fn gather(&mut self, plan: &Plan, first: u32, hits: &[types::Hit]) -> Result<Light> {
         let count = hits.len() as u32;
@@ -257,6 +273,7 @@ impl Transport {
             return Ok(Light::default());
         }
         let times = plan.times.len() as u32;
+        let mask_words = self.masks.words_for(plan);
         let vertices = u64::from(count) * u64::from(consts::DAY_VERTICES);
         let batch = (MOST_VERTICES / vertices).clamp(1, BATCH.into()) as u32;
         let buffer = |name, bytes: u64| OwnedBuffer::new(&self.gpu, name, BufferDesc::device(bytes.max(16)));
@@ -287,33 +304,56 @@ impl Transport {
             let sun_sums = graph.import_buffer(&sun_sums);
             let sky_sums = graph.import_buffer(&sky_sums);
             let lamp_sums = graph.import_buffer(&lamp_sums);
+            let masks = self.masks.frame(&mut graph, paths * u64::from(consts::DAY_VERTICES));
             if first_sample == 0 {
                 graph.fill(sun_sums, 0);
                 graph.fill(sky_sums, 0);
                 graph.fill(lamp_sums, 0);
             }
             let spots = graph.buffer("daylight.spots", u64::from(count) * size_of::<types::DaySpot>() as u64);
-            let settings =
-                graph.uniform(&settings(plan, first, [count, now, first_sample], handles.moment.lights.len() as u32));
-            let args = traced!(walk::Args { settings, receivers, vertices, escapes, counts, spots }, rays, handles);
+            let of_lights = handles.moment.lights.len() as u32;
+            let settings = graph.uniform(&settings(plan, first, [count, now, first_sample], [of_lights, mask_words]));
+            let args = traced!(
+                walk::Args {
+                    settings,
+                    receivers,
+                    vertices,
+                    escapes,
+                    counts,
+                    cells: masks.cells,
+                    cell_firsts: masks.cell_firsts,
+                    known: masks.known,
+                    wanted: masks.wanted,
+                    asks: masks.asks,
+                    spots,
+                },
+                rays,
+                handles
+            );
             let bounces = u64::from(plan.settings.vertices());
             let paths = count * now;
             graph.compute(args, paths).rays(u64::from(paths) * bounces);
             if times > 0 {
+                let suns = graph.import_buffer(&self.suns);
+                if mask_words > 0 {
+                    let of_vertices = u64::from(paths) * bounces.div_ceil(2);
+                    self.masks.compute(&mut graph, (settings, suns), (&handles, rays), masks, of_vertices);
+                }
                 let args = traced!(
                     suns::Args {
                         settings,
-                        suns: graph.import_buffer(&self.suns),
+                        suns,
                         vertices,
                         counts,
                         sums: sun_sums,
+                        bits: masks.bits,
+                        spec: suns::Spec { masks: u32::from(mask_words > 0) },
                         push: suns::Push { first: 0, count: now },
                     },
                     rays
                 );
                 // About half of all vertices are there, and half of them face the sun.
-                let shadow_rays = u64::from(count) * u64::from(times) * bounces.div_ceil(4);
-                let items = Items::new(now).rays(shadow_rays).turns(bounces * most_turns);
+                let items = sun_items([count, times, now], bounces, mask_words, most_turns);
                 graph.compute_over(args, [times, count], items);
             }
             if groups > 0 {
@@ -346,12 +386,12 @@ impl Transport {
             graph.compute(args, count);
             first_sample += now;
             if first_sample < samples {
-                self.runner.run(&graph)?;
+                self.run(&graph)?;
                 continue;
             }
             let [sun, sky, lamps, spots] =
                 [sun_sums, sky_sums, lamp_sums, spots].map(|buffer| graph.read_buffer(buffer));
-            let frame = self.runner.run(&graph)?;
+            let frame = self.run(&graph)?;
             let spot = |spot: types::DaySpot| Spot { position: spot.position, normal: spot.normal };
             let spots = frame.buffer(spots).into_iter().map(spot).collect();
             let mut light = Light { spots, ..Light::default() };
@@ -361,20 +401,6 @@ impl Transport {
             return Ok(light);
         }
     }
-}
-
-/// The suns of all times; one more, so that the buffer is never empty.
-fn suns_of(gpu: &Gpu, plan: &Plan) -> Result<OwnedBuffer> {
-    // Place and squared distance of a sun that is a point, else direction and 0.
-    let entry = |sun: [f32; 3]| match plan.calendar.point {
-        Some(point) => {
-            let [x, y, z] = point.position(sun);
-            [x, y, z, point.distance * point.distance]
-        }
-        None => [sun[0], sun[1], sun[2], 0.0],
-    };
-    let suns: Vec<[f32; 4]> = plan.times.iter().map(|time| time.sun).chain([[0.0, 1.0, 0.0]]).map(entry).collect();
-    OwnedBuffer::with_contents(gpu, "daylight.suns", bytemuck::cast_slice(&suns))
 }
 
 /// The lamps as they are sampled, made once.
@@ -411,7 +437,7 @@ pub(super) fn settings(
     plan: &Plan,
     first_receiver: u32,
     [receivers, samples, first_sample]: [u32; 3],
-    lights: u32,
+    [lights, mask_words]: [u32; 2],
 ) -> types::DaySettings {
     let baking = &plan.settings;
     let mut flags = 0;
@@ -435,6 +461,7 @@ pub(super) fn settings(
         lights,
         groups: plan.lamps.len() as u32,
         sun_radius: if baking.disc { SUN_ANGULAR_RADIUS.tan() as f32 } else { 0.0 },
+        mask_words,
     }
 }
 

@@ -7,8 +7,8 @@ use lucerna::{
     Error, Result,
     scene::{Aabb, Scene, View},
     techniques::daylight::{
-        Adaptive, Baking, Calendar, Course, Day, Kind, Lit, MOST_TIMES, NEXT_DAY, Plan, Sources, SunPath, SunPoint,
-        Transport, Weather, adaptive, cube, digest, lamps, lightmap, parts, probes::Grid,
+        Adaptive, Baking, Calendar, Cells, Course, Day, Kind, Lit, MOST_TIMES, NEXT_DAY, Plan, Sources, SunPath,
+        SunPoint, Transport, Weather, adaptive, cube, digest, lamps, lightmap, parts, probes::Grid,
     },
 };
 use serde::{Deserialize, Serialize};
@@ -378,6 +378,12 @@ fn planned(
         settings: baking.clone(),
     };
     plan.check_whole()?;
+    let masks = Cells::new(scene, &plan.settings, plan.times.len())?;
+    if masks.count > 0 {
+        let (spacing, points) = (plan.settings.sun_masks, masks.count);
+        let bytes = masks.bytes(plan.times.len());
+        notes.push(format!("sun masks at {points} points, {spacing} m apart: {bytes} bytes of the device's memory"));
+    }
     Ok(Planned { plan, sources, corners, notes })
 }
 

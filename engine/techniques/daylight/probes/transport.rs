@@ -19,6 +19,7 @@ use crate::{
     },
     techniques::daylight::{
         Plan, Transport,
+        suns::sun_items,
         transport::{LAMP_TURNS, Light, lamp_table, settings},
     },
 };
@@ -129,6 +130,7 @@ impl Transport {
     ) -> Result<Vec<types::DayStart>> {
         let (count, times) = (positions.len() as u32, plan.times.len() as u32);
         let groups = plan.lamps.len();
+        let mask_words = if lit { self.masks.words_for(plan) } else { 0 };
         let mut graph = Graph::new("daylight.probes");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);
@@ -138,11 +140,29 @@ impl Transport {
         let escapes = graph.import_buffer(&buffers.escapes);
         let counts = graph.import_buffer(&buffers.counts);
         let lights = handles.moment.lights.len() as u32;
-        let settings = graph.uniform(&settings(plan, first, [count, now, first_sample], lights));
+        let settings = graph.uniform(&settings(plan, first, [count, now, first_sample], [lights, mask_words]));
         let positions: Vec<[f32; 3]> = positions.iter().map(|position| position.to_array()).collect();
         let probes = graph.buffer_from("daylight.probes", &positions);
-        let args = traced!(probe_walk::Args { settings, probes, starts, vertices, escapes, counts }, rays, handles);
-        let (paths, bounces) = (count * now, u64::from(plan.settings.vertices()));
+        let paths = count * now;
+        let masks = self.masks.frame(&mut graph, u64::from(paths) * u64::from(consts::DAY_VERTICES));
+        let args = traced!(
+            probe_walk::Args {
+                settings,
+                probes,
+                starts,
+                vertices,
+                escapes,
+                counts,
+                cells: masks.cells,
+                cell_firsts: masks.cell_firsts,
+                known: masks.known,
+                wanted: masks.wanted,
+                asks: masks.asks,
+            },
+            rays,
+            handles
+        );
+        let bounces = u64::from(plan.settings.vertices());
         graph.compute(args, paths).rays(u64::from(paths) * bounces);
         if lit {
             let [sun, sky, lamps] =
@@ -153,20 +173,26 @@ impl Transport {
                 });
             }
             if times > 0 {
+                let suns = graph.import_buffer(&self.suns);
+                if mask_words > 0 {
+                    let of_vertices = u64::from(paths) * bounces.div_ceil(2);
+                    self.masks.compute(&mut graph, (settings, suns), (&handles, rays), masks, of_vertices);
+                }
                 let args = traced!(
                     probe_suns::Args {
                         settings,
-                        suns: graph.import_buffer(&self.suns),
+                        suns,
                         starts,
                         vertices,
                         counts,
                         sums: sun,
+                        bits: masks.bits,
+                        spec: probe_suns::Spec { masks: u32::from(mask_words > 0) },
                         push: probe_suns::Push { first: 0, count: now },
                     },
                     rays
                 );
-                let shadow_rays = u64::from(count) * u64::from(times) * bounces.div_ceil(4);
-                let items = Items::new(now).rays(shadow_rays).turns(bounces * most_turns);
+                let items = sun_items([count, times, now], bounces, mask_words, most_turns);
                 graph.compute_over(args, [times, count], items);
             }
             graph.compute(probe_sky::Args { settings, starts, escapes, sums: sky }, count);
@@ -206,7 +232,7 @@ impl Transport {
             }
         }
         let read = graph.read_buffer(starts);
-        let mut starts: Vec<types::DayStart> = self.runner.run(&graph)?.buffer(read);
+        let mut starts: Vec<types::DayStart> = self.run(&graph)?.buffer(read);
         starts.truncate(paths as usize);
         Ok(starts)
     }

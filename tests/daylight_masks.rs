@@ -1,0 +1,123 @@
+//! Sun masks against exact shadow rays, and shadow rays that only a part of the vertices sends.
+
+use crate::{
+    daylight_lab::lights,
+    daylight_light::{baking, eye, plan, stage},
+    tracer_lab::{Stage, view},
+};
+use glam::{Vec3, vec3};
+use lucerna::{
+    gpu::testing::with_gpu,
+    scene::{Material, Scene, View},
+    techniques::daylight::{Baking, Cells, Light, Lit, Plan, Sources, SunPoint, Transport},
+};
+
+/// Suns along a half circle: more times than one and two words of a mask have.
+fn day(scene: &Scene, eye: &View, settings: Baking) -> Plan {
+    let sun = |i: usize| {
+        let angle = (i as f32 + 0.5) / 70.0 * std::f32::consts::PI;
+        vec3(angle.cos(), angle.sin(), 0.4).normalize().to_array()
+    };
+    let times = (0..70).map(|i| Lit { seconds: 600.0 * i as f64, sun: sun(i) }).collect();
+    Plan { times, steps: 70, ..plan(scene, eye, settings) }
+}
+
+/// For each time the light of all texels and colours.
+fn by_time(tiles: &[Light], times: usize) -> Vec<f64> {
+    let rows = tiles.iter().flat_map(|light| light.sun.chunks_exact(times));
+    rows.fold(vec![0.0; times], |sums, row| sums.iter().zip(row).map(|(sum, light)| sum + f64::from(*light)).collect())
+}
+
+fn of_view(gpu: &lucerna::gpu::Gpu, scene: &Scene, eye: View, plan: &Plan) -> Vec<Light> {
+    lights(gpu, scene, plan, Sources::View(Box::new(eye)))
+}
+
+#[test]
+fn masks_have_the_light_of_shadow_rays_at_all_times() {
+    with_gpu(|gpu| {
+        let (scene, eye) = (stage(), eye());
+        for point in [None, Some(SunPoint { centre: [0.0, 1.0, 0.0], distance: 6.0 })] {
+            let times = [0.0, 0.05].map(|sun_masks| {
+                let settings = Baking { samples: 64, sun_masks, disc: point.is_none(), ..baking() };
+                let mut plan = day(&scene, &eye, settings);
+                plan.calendar.point = point;
+                by_time(&of_view(gpu, &scene, eye, &plan), 70)
+            });
+            let [exact, masks] = times;
+            let brightest = exact.iter().copied().fold(0.0, f64::max);
+            let (all_exact, all_masks) = (exact.iter().sum::<f64>(), masks.iter().sum::<f64>());
+            assert!((all_masks / all_exact - 1.0).abs() < 0.01, "the day: {all_masks} of {all_exact}");
+            for (time, (exact, masks)) in exact.iter().zip(&masks).enumerate() {
+                assert!((masks - exact).abs() < 0.02 * brightest.min(2.0 * exact), "time {time}: {masks} of {exact}");
+            }
+        }
+    });
+}
+
+#[test]
+fn masks_of_surfaces_without_shadows_change_no_bit() {
+    with_gpu(|gpu| {
+        let mut stage = Stage::new();
+        let white = stage.material(Material::diffuse("white", Vec3::splat(0.7)));
+        stage.quad(white, vec3(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0);
+        stage.quad(white, vec3(-2.0, 0.0, -2.0), Vec3::X * 4.0, Vec3::Y * 2.0);
+        let eye = view(vec3(0.0, 1.0, 4.0), vec3(0.0, 0.5, 0.0), 50.0, [24, 18]);
+        // All suns are before both surfaces. One scattering: all vertices send shadow rays.
+        let both = [0.0, 0.3].map(|sun_masks| {
+            let settings = Baking { samples: 16, bounces: 1, sun_masks, ..baking() };
+            of_view(gpu, &stage.scene, eye, &day(&stage.scene, &eye, settings))
+        });
+        assert!(by_time(&both[0], 70).iter().all(|light| *light > 0.0));
+        assert!(both[0] == both[1]);
+    });
+}
+
+#[test]
+fn no_light_leaks_through_masks_into_a_closed_box() {
+    with_gpu(|gpu| {
+        let mut stage = Stage::new();
+        let white = stage.material(Material::diffuse("white", Vec3::splat(0.9)));
+        stage.cuboid(white, Vec3::splat(-1.0), Vec3::splat(1.0), true);
+        let eye = view(vec3(0.2, 0.1, 0.9), vec3(0.0, 0.0, -1.0), 80.0, [16, 12]);
+        // Cells larger than the sides: one for each triangle.
+        for sun_masks in [0.1, 5.0] {
+            let plan = day(&stage.scene, &eye, Baking { samples: 32, disc: true, sun_masks, ..baking() });
+            let tiles = of_view(gpu, &stage.scene, eye, &plan);
+            assert!(tiles.iter().any(|light| !light.sun.is_empty()));
+            assert!(by_time(&tiles, 70).iter().all(|light| *light == 0.0), "{sun_masks}");
+        }
+    });
+}
+
+#[test]
+fn a_tile_has_the_same_bits_with_masks_whatever_else_is_baked() {
+    with_gpu(|gpu| {
+        let (scene, eye) = (stage(), eye());
+        let plan = day(&scene, &eye, Baking { samples: 8, tile: 16, sun_masks: 0.2, ..baking() });
+        let mut transport = Transport::new(gpu, &scene, &plan, Sources::View(Box::new(eye))).unwrap();
+        let after_others = [0, 1, 3].map(|tile| transport.tile(&plan, tile).unwrap())[2].clone();
+        let alone = Transport::new(gpu, &scene, &plan, Sources::View(Box::new(eye))).unwrap().tile(&plan, 3).unwrap();
+        assert!(alone == after_others);
+        // Fewer times, as after the choice of the steps: the masks are new.
+        let fewer = Plan { times: plan.times.iter().copied().step_by(2).collect(), ..plan.clone() };
+        transport.follow(&fewer).unwrap();
+        let tile = transport.tile(&fewer, 3).unwrap();
+        let each_second: Vec<f32> = alone.sun.chunks_exact(70).flat_map(|row| row.iter().copied().step_by(2)).collect();
+        assert!(tile.sun == each_second);
+    });
+}
+
+#[test]
+fn too_many_points_of_masks_are_refused_with_a_distance_that_is_allowed() {
+    let (scene, eye) = (stage(), eye());
+    let plan = day(&scene, &eye, baking());
+    let cells = |sun_masks: f32| Cells::new(&scene, &Baking { sun_masks, ..plan.settings.clone() }, 70);
+    assert_eq!(cells(0.0).unwrap(), Cells::default());
+    // 60 m² of surfaces, and half of a triangle's grid lies outside of it.
+    let count = cells(0.1).unwrap().count;
+    assert!((6_000..12_000).contains(&count), "{count}");
+    let text = cells(0.001).unwrap_err().to_string();
+    assert!(text.contains("bake.sun_masks") && text.contains("70 times"), "{text}");
+    let allowed: f32 = text.split("at least ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!(cells(allowed).unwrap().count > 1_000_000, "{allowed}");
+}
