@@ -54,6 +54,51 @@ fn masks_have_the_light_of_shadow_rays_at_all_times() {
     });
 }
 
+/// Light of the whole day with masks, by that with shadow rays.
+fn ratio(gpu: &lucerna::gpu::Gpu, scene: &Scene, eye: View, sun_masks: f32) -> f64 {
+    let [exact, masks] = [0.0, sun_masks].map(|sun_masks| {
+        let plan = day(scene, &eye, Baking { samples: 64, bounces: 1, sun_masks, ..baking() });
+        by_time(&of_view(gpu, scene, eye, &plan), 70).iter().sum::<f64>()
+    });
+    masks / exact
+}
+
+#[test]
+fn both_sides_of_a_surface_have_masks() {
+    with_gpu(|gpu| {
+        let mut stage = Stage::new();
+        let white = stage.material(Material::diffuse("white", Vec3::splat(0.7)));
+        // A wall in the middle of a floor: the view is of its back, and the sun comes to both sides.
+        stage.quad(white, vec3(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0);
+        stage.quad(white, vec3(0.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::Y * 2.0);
+        for x in [-4.0, 4.0] {
+            let eye = view(vec3(x, 1.5, 0.0), vec3(0.0, 0.3, 0.0), 45.0, [24, 18]);
+            let ratio = ratio(gpu, &stage.scene, eye, 0.05);
+            assert!((ratio - 1.0).abs() < 0.01, "seen from {x}: {ratio}");
+        }
+    });
+}
+
+#[test]
+fn points_of_masks_are_not_under_things() {
+    with_gpu(|gpu| {
+        let mut stage = Stage::new();
+        let white = stage.material(Material::diffuse("white", Vec3::splat(0.7)));
+        stage.quad(white, vec3(-2.0, 0.0, -2.0), Vec3::Z * 4.0, Vec3::X * 4.0);
+        stage.quad(white, vec3(-2.0, 0.0, -2.0), Vec3::X * 4.0, Vec3::Y * 2.0);
+        // Low plates on half of each square metre of the floor, which has cells of a square metre.
+        for x in -2..2 {
+            for z in -2..2 {
+                let low = vec3(x as f32, 0.0, z as f32);
+                stage.cuboid(white, low, low + vec3(0.5, 0.02, 1.0), false);
+            }
+        }
+        let eye = view(vec3(0.0, 1.0, 4.0), vec3(0.0, 0.8, -2.0), 40.0, [24, 18]);
+        let ratio = ratio(gpu, &stage.scene, eye, 1.0);
+        assert!((ratio - 1.0).abs() < 0.08, "{ratio}");
+    });
+}
+
 #[test]
 fn masks_of_surfaces_without_shadows_change_no_bit() {
     with_gpu(|gpu| {
