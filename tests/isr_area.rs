@@ -83,6 +83,11 @@ fn masks_hold_for_light_of_surfaces_that_the_picture_does_not_show() {
         assert!(whole.min_element() > 0.0);
         let none = light("white=0,red=0,green=0");
         assert!(none.iter().all(|pixel| *pixel == Vec3::ZERO), "{}", mean(&none));
+        // White walls receive nothing, also not from the surfaces beside the picture; most of the picture is white.
+        let dark = light("white=0");
+        let black = dark.iter().filter(|pixel| **pixel == Vec3::ZERO).count();
+        println!("{black} of {} pixels are black", dark.len());
+        assert!(black > dark.len() / 3 && mean(&dark).max_element() > 0.0, "{black} of {}", dark.len());
         let ones = mean(&light("white=1,red=1,green=1")) / whole;
         assert!((ones - 1.0).abs().max_element() < 0.02, "{ones}");
         // Received and sent light have the factor; light that is scattered more often has it more often.

@@ -130,6 +130,8 @@ fn weighted_pyramids_are_solved_as_by_the_slow_solver() {
             let error = most(&found, &slow);
             println!("{width}×{height}: {error:e} of {scale}, {} steps, residual {:e}", state.steps, state.residual);
             assert!(error < 1e-4 * scale && state.residual < RESIDUAL, "{width}×{height}: {error:e} of {scale}");
+            // Steps that are not conjugate to those before need more.
+            assert!(state.steps <= 18, "{width}×{height}: {} steps", state.steps);
         }
     });
 }
