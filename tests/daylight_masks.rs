@@ -9,7 +9,7 @@ use glam::{Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
     scene::{Material, Scene, View},
-    techniques::daylight::{Baking, Cells, Light, Lit, Plan, Sources, SunPoint, Transport},
+    techniques::daylight::{Baking, Cells, Light, Lit, Plan, Sources, SunPoint, Transport, probes::Grid},
 };
 
 /// Suns along a half circle: more times than one and two words of a mask have.
@@ -138,7 +138,7 @@ fn no_light_leaks_through_masks_into_a_closed_box() {
 fn a_tile_has_the_same_bits_with_masks_whatever_else_is_baked() {
     with_gpu(|gpu| {
         let (scene, eye) = (stage(), eye());
-        let plan = day(&scene, &eye, Baking { samples: 8, tile: 16, sun_masks: 0.2, ..baking() });
+        let plan = day(&scene, &eye, Baking { samples: 8, tile: 16, disc: true, sun_masks: 0.2, ..baking() });
         let mut transport = Transport::new(gpu, &scene, &plan, Sources::View(Box::new(eye))).unwrap();
         let after_others = [0, 1, 3].map(|tile| transport.tile(&plan, tile).unwrap())[2].clone();
         let alone = Transport::new(gpu, &scene, &plan, Sources::View(Box::new(eye))).unwrap().tile(&plan, 3).unwrap();
@@ -149,6 +149,21 @@ fn a_tile_has_the_same_bits_with_masks_whatever_else_is_baked() {
         let tile = transport.tile(&fewer, 3).unwrap();
         let each_second: Vec<f32> = alone.sun.chunks_exact(70).flat_map(|row| row.iter().copied().step_by(2)).collect();
         assert!(tile.sun == each_second);
+    });
+}
+
+#[test]
+fn probes_have_the_light_of_shadow_rays_with_masks() {
+    with_gpu(|gpu| {
+        let (scene, eye) = (stage(), eye());
+        let [exact, masks] = [0.0, 0.1].map(|sun_masks| {
+            let settings = Baking { probe_samples: 256, sun_masks, ..baking() };
+            let around = Grid::around(&scene, 1.0).unwrap();
+            let plan = Plan { probes: Some(Grid::new(&around, 1.0, 64)), ..day(&scene, &eye, settings) };
+            let mut transport = Transport::new(gpu, &scene, &plan, Sources::View(Box::new(eye))).unwrap();
+            by_time(&[transport.brick(&plan, 0).unwrap().light], 70).iter().sum::<f64>()
+        });
+        assert!(exact > 0.0 && (masks / exact - 1.0).abs() < 0.015, "{masks} of {exact}");
     });
 }
 

@@ -366,22 +366,19 @@ fn run() -> Result<()> {
     };
     let kept = needed(&(0..lit).map(coloured).collect::<Result<Vec<_>>>()?)?;
     let all = paths.seconds() + compression.seconds();
-    println!("\n{:<58} {:>9} {:>11} {:>8} {:>9}", "indirect light of the day", "frames", "seconds", "±", "of each");
+    println!("\n{:<58} {:>9} {:>11} {:>8} {:>10}", "indirect light of the day", "frames", "seconds", "±", "of the 1st");
+    let each = at_each.0 * lit as f64;
+    let share = |seconds: f64| format!("1/{:.1}", each / seconds);
     let row = |what: &str, frames: usize, (mean, deviation): (f64, f64)| {
         let seconds = mean * frames as f64;
-        println!(
-            "{what:<58} {frames:>9} {seconds:>11.1} {:>8.1} {:>9}",
-            deviation * frames as f64,
-            format!("1/{:.1}", seconds / paths.seconds())
-        );
-        seconds
+        println!("{what:<58} {frames:>9} {seconds:>11.1} {:>8.1} {:>10}", deviation * frames as f64, share(seconds));
     };
-    let each = row("one by one, the noise of the shared way at each time", lit, at_each);
+    row("one by one, the noise of the shared way at each time", lit, at_each);
     row("one by one, as many paths in each, equal mean noise", lit, alike(&curves, mean(&there), mean));
     row("one by one, as many paths in each, equal worst noise", lit, alike(&curves, worst(&there), worst));
     row("adaptive (paper's test), noise at each time", kept.len(), at_each);
     let row_of = |what: &str, seconds: f64| {
-        println!("{what:<58} {lit:>9} {seconds:>11.1} {:>8} {:>9}", "", format!("1/{:.1}", each / seconds));
+        println!("{what:<58} {lit:>9} {seconds:>11.1} {:>8} {:>10}", "", share(seconds));
     };
     row_of("shared paths, exact shadow rays", paths.seconds());
     row_of("the same with compression", all);

@@ -26,7 +26,7 @@ struct DaySettings {
     uint lights;          // of the scene
     uint groups;          // of lamps
     float sun_radius;     // tangent of the angular radius of the sun's disc
-    uint mask_words;      // of 32 times each for a cell of the sun masks; 0: there are no masks
+    uint mask_words;      // of 32 times each for a side of a cell of the sun masks; 0: there are no masks
 };
 
 // A surface point of a path that reflects direct light.
@@ -36,10 +36,10 @@ struct DayVertex {
     vec3 geometric;  // of the triangle, unit, on the side of the normal
     vec3 weight;     // irradiance at the receiver for each W/m² of irradiance at the vertex
     float sun;       // factor on the light of the sun: 1 / the probability with which the vertex asks for it; 0: it does not ask
-    uint cell;       // of the sun masks, if there are any (daylight/masks.glsl)
+    uint side;       // of a cell of the sun masks, if there are any (daylight/masks.glsl)
 };
 
-// The cells of a triangle for which the sun masks have a bit for each time. A grid of columns along the longest side and of rows to the corner
+// The cells of a triangle. The sun masks have a bit for each time for each side of a cell: twice the number of the cell, and 1 for its back. A grid of columns along the longest side and of rows to the corner
 // opposite to it. Twin: techniques::daylight::masks::Cells.
 struct DayCells {
     uint first;   // number of the first cell
@@ -54,7 +54,7 @@ const uint DAY_MASK_ROW = 32768u;
 // The masks that the paths of a batch ask for.
 struct DayAsks {
     uvec3 point_groups;  // that choose the points
-    uvec3 ray_groups;    // rows of points, times and rows
+    uvec3 ray_groups;    // points of a row, 1, rows
     uint count;          // of sides of cells
 };
 
@@ -64,7 +64,7 @@ struct DayMaskPoint {
     vec3 normal;    // of the triangle, unit, on the side of the mask
     vec2 disc;      // the place on the disc of the sun
     uint salt;
-    uint cell;
+    uint side;      // of the cell
 };
 
 // The end of a path that left the scene.

@@ -28,6 +28,8 @@ layout(binding = 14, scalar) readonly buffer CellFirsts { uint cell_firsts[]; };
 // Random points of a cell, and rays of each.
 const uint POINTS = 4u;
 const uint RAYS = 3u;
+// Of rays that end under a thing, metres.
+const float SHORT = 0.1;
 
 layout(push_constant, scalar) uniform Push {
     uint triangles;  // of all instances
@@ -57,11 +59,11 @@ uint instance_of(uint triangle) {
     return low;
 }
 
-// Whether a ray is at least as long as half a cell, and does not hit the inside of a solid.
+// Whether a ray is not short, and does not hit the inside of a solid.
 bool is_long(vec3 from, vec3 direction, uint salt) {
     Hit hit = trace(Ray(from, 0.0, direction, 1e30), TRACE_SHADOW, salt, false);
     if (hit.instance == NONE) return true;
-    if (hit.t < 0.5 * spacing) return false;
+    if (hit.t < min(0.5 * spacing, SHORT)) return false;
     bool thin = (MATERIAL_AT(INSTANCE_AT(hit.instance).material).flags & MATERIAL_DOUBLE_SIDED) != 0u;
     return thin || dot(surface_point(hit.instance, hit.triangle, hit.barycentrics).area, direction) < 0.0;
 }
@@ -69,11 +71,12 @@ bool is_long(vec3 from, vec3 direction, uint salt) {
 void main() {
     uint ask = gl_GlobalInvocationID.x;
     if (ask >= asks.count) return;
-    uint cell = wanted[ask] >> 1u;
-    bool back = (wanted[ask] & 1u) != 0u;
+    uint side = wanted[ask];
+    uint cell = side >> 1u;
+    bool back = (side & 1u) != 0u;
     uint of_all = triangle_of(cell);
     uint instance = instance_of(of_all);
-    uvec4 hash = pcg4d(uvec4(wanted[ask], 0x2545f491u, settings.seed, 7u));
+    uvec4 hash = pcg4d(uvec4(side, 0x2545f491u, settings.seed, 7u));
     DayMaskPoint first;
     bool found = false;
     for (uint i = 0u; i < POINTS && !found; ++i) {
@@ -83,7 +86,7 @@ void main() {
         vec3 normal = normalize(back ? -point.area : point.area);
         vec3 above = point.position + normal * (2.0 * surface_gap(point));
         vec2 disc = day_sun_disc(hash.zw, settings.sun_radius);
-        DayMaskPoint candidate = DayMaskPoint(above, normal, disc, hash.z, cell);
+        DayMaskPoint candidate = DayMaskPoint(above, normal, disc, hash.z, side);
         if (i == 0u) first = candidate;
         mat3 around = frame_around(normal);
         for (uint k = 0u; k < RAYS && !found; ++k) {

@@ -14,17 +14,19 @@ uint day_cell(uint instance, uint triangle, vec2 barycentrics) {
     return of.first + row * columns + column;
 }
 
-// Barycentrics of a point of a cell; `at`: its place in the cell, 0 to 1. Cells at the sides of a triangle lie half outside; their points move
-// onto it along the longest side. All points stay a little away from the sides, where rounding could put them behind the next wall.
+// Barycentrics of a point of a cell; `at`: its place in the part of the cell that is on the triangle, 0 to 1. All points stay a little away from the
+// sides of the triangle, where rounding could put them behind the next wall.
 vec2 day_cell_point(DayCells of, uint cell, vec2 at) {
     uint columns = of.size & 0x7fffu, rows = of.size >> 15u & 0x7fffu, base = of.size >> 30u;
     uint number = cell - of.first;
-    vec2 place = (vec2(float(number % columns), float(number / columns)) + at) / vec2(float(columns), float(rows));
-    float before = of.foot * place.y;
-    float end = clamp(place.x - before, 0.0, 1.0 - place.y);
-    vec2 inside = mix(vec2(end, place.y), vec2(1.0 / 3.0), 1e-3);
-    end = inside.x;
-    place.y = inside.y;
-    float start = 1.0 - end - place.y;
-    return base == 0u ? vec2(end, place.y) : base == 1u ? vec2(start, end) : vec2(place.y, start);
+    // Along the longest side, where the lower end of the cell is on the triangle; then up to the nearer of the other two sides.
+    float low = float(number / columns) / float(rows), column = float(number % columns);
+    vec2 ends = vec2(max(column / float(columns), of.foot * low), min((column + 1.0) / float(columns), 1.0 - (1.0 - of.foot) * low));
+    float along = mix(ends.x, max(ends.x, ends.y), at.x);
+    float high = min(along / max(of.foot, 1e-9), (1.0 - along) / max(1.0 - of.foot, 1e-9));
+    high = clamp(high, low, float(number / columns + 1u) / float(rows));
+    float apex = mix(low, high, at.y);
+    vec2 inside = mix(vec2(along - of.foot * apex, apex), vec2(1.0 / 3.0), 1e-3);
+    float start = 1.0 - inside.x - inside.y;
+    return base == 0u ? inside : base == 1u ? vec2(start, inside.x) : vec2(inside.y, start);
 }

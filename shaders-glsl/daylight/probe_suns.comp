@@ -21,7 +21,7 @@ layout(binding = 11, scalar) readonly buffer Counts { uint counts[]; };
 // each probe.
 layout(binding = 12, scalar) buffer Sums { vec3 sums[]; };
 
-// A bit for each cell and time: whether the sun is seen from there.
+// A bit for each side of a cell and each time: whether the sun is seen from there.
 layout(binding = 15, scalar) readonly buffer Bits { uint bits[]; };
 
 #include "daylight/sun_ray.glsl"

@@ -18,7 +18,7 @@ vec3 day_sun(uint path, uint of_bake, uint number, uint time, vec4 sun, mat3 aro
         float cosine = dot(vertex.normal, ray.direction);
         if (cosine <= 0.0 || dot(vertex.geometric, ray.direction) <= 0.0) continue;
         bool seen;
-        if (MASKS != 0u) seen = (bits[vertex.cell * settings.mask_words + (time >> 5u)] >> (time & 31u) & 1u) != 0u;
+        if (MASKS != 0u) seen = (bits[vertex.side * settings.mask_words + (time >> 5u)] >> (time & 31u) & 1u) != 0u;
         else seen = !trace_any(Ray(vertex.position, 0.0, ray.direction, ray.far), TRACE_SHADOW, hash.z);
         if (seen) sum += vertex.weight * (vertex.sun * ray.strength * cosine);
     }

@@ -1,4 +1,4 @@
-// At which times of the day the sun is seen from points: a bit for each time in the masks of their cells. Invocations side by side have the same
+// At which times of the day the sun is seen from points: a bit for each time in the masks of their sides of cells. Invocations side by side have the same
 // point and neighbouring times, so that their rays stay together.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
@@ -20,15 +20,22 @@ layout(binding = 12, scalar) buffer Bits { uint bits[]; };
 
 #include "daylight/sun_ray.glsl"
 
+layout(push_constant, scalar) uniform Push {
+    uint first;  // of the groups of 64 times
+    uint count;
+};
+
 void main() {
     uint ask = gl_WorkGroupID.z * DAY_MASK_ROW + gl_WorkGroupID.x;
-    uint time = gl_GlobalInvocationID.y;
-    if (ask >= asks.count || time >= settings.times) return;
+    if (ask >= asks.count) return;
     DayMaskPoint point = points[ask];
-    vec4 sun = suns[time];
-    DaySunRay ray = day_sun_ray(point.position, sun, sun_frame(sun), point.disc);
-    // The mask of the other side has the bits of the other times.
-    if (dot(point.normal, ray.direction) <= 0.0) return;
-    if (trace_any(Ray(point.position, 0.0, ray.direction, ray.far), TRACE_SHADOW, point.salt)) return;
-    atomicOr(bits[point.cell * settings.mask_words + (time >> 5u)], 1u << (time & 31u));
+    for (uint group = first; group < first + count; ++group) {
+        uint time = 64u * group + gl_LocalInvocationID.y;
+        if (time >= settings.times) return;
+        vec4 sun = suns[time];
+        DaySunRay ray = day_sun_ray(point.position, sun, sun_frame(sun), point.disc);
+        if (dot(point.normal, ray.direction) <= 0.0) continue;
+        if (trace_any(Ray(point.position, 0.0, ray.direction, ray.far), TRACE_SHADOW, point.salt)) continue;
+        atomicOr(bits[point.side * settings.mask_words + (time >> 5u)], 1u << (time & 31u));
+    }
 }

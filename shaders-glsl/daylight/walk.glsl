@@ -30,9 +30,9 @@ layout(binding = 10, scalar) writeonly buffer Escapes { DayEscape escapes[]; };
 layout(binding = 11, scalar) writeonly buffer Counts { uint counts[]; };
 layout(binding = 15, scalar) readonly buffer Cells { DayCells cells[]; };
 layout(binding = 16, scalar) readonly buffer CellFirsts { uint cell_firsts[]; };
-// Two bits for each cell: whether the masks of its front and of its back are there, or asked for.
-layout(binding = 17, scalar) buffer Known { uint known[]; };
-// Twice the number of a cell, and 1 for its back: those that are new.
+// A bit for each side of a cell: whether its mask is there, or asked for.
+layout(binding = 17, scalar) coherent buffer Known { uint known[]; };
+// Sides of cells: those that are new.
 layout(binding = 18, scalar) writeonly buffer Wanted { uint wanted[]; };
 layout(binding = 19, scalar) buffer Asks { DayAsks asks; };
 
@@ -42,7 +42,7 @@ layout(binding = 19, scalar) buffer Asks { DayAsks asks; };
 // vertex costs a ray for each time of the day, and late vertices carry little.
 const float DAY_ASK = 0.5;
 
-// Asks for the mask of a side of a cell if it is not there.
+// Asks for a mask if it is not there.
 void want_mask(uint side) {
     uint bit = 1u << (side & 31u);
     if ((known[side >> 5u] & bit) != 0u || (atomicOr(known[side >> 5u], bit) & bit) != 0u) return;
@@ -135,15 +135,15 @@ void main() {
             float largest = brightest(weight) / SAMPLING_PI;
             if (count == 0u) leading = largest;
             float sun = 1.0;
-            uint cell = 0u;
+            uint side = 0u;
             if (settings.mask_words != 0u) {
-                cell = day_cell(hit.instance, hit.triangle, hit.barycentrics);
-                want_mask(2u * cell + (s.front ? 0u : 1u));
+                side = 2u * day_cell(hit.instance, hit.triangle, hit.barycentrics) + (s.front ? 0u : 1u);
+                want_mask(side);
             } else if (largest < DAY_ASK * leading) {
                 float ask = largest / (DAY_ASK * leading);
                 sun = unit_float(pcg4d(uvec4(salt, 5u, 6u, 7u)).x) < ask ? 1.0 / ask : 0.0;
             }
-            vertices[path * DAY_VERTICES + count] = DayVertex(above, s.normal, s.side, weight / SAMPLING_PI, sun, cell);
+            vertices[path * DAY_VERTICES + count] = DayVertex(above, s.normal, s.side, weight / SAMPLING_PI, sun, side);
             ++count;
             if (count >= settings.bounces) break;
             if (count > settings.roulette && largest < 0.25) {

@@ -75,6 +75,9 @@ fn impossible_days_are_exit_code_2_and_say_what_is_possible() {
         (&["--dates", "2026-06-21", "--date", "2026-06-21"], &["--dates", "--date"]),
         (&["--sun-distance", "1"], &["--sun-distance is 1", "outside the scene"]),
         (&["--sun-distance", "nan"], &["--sun-distance"]),
+        (&["-D", "bake.sun_masks=0.0001"], &["bake.sun_masks", "0.0001", "0.001"]),
+        (&["-D", "bake.sun_masks=-1"], &["bake.sun_masks", "-1"]),
+        (&["-D", "bake.sun_masks=0.001"], &["bake.sun_masks", "points for", "Choose at least"]),
         (&["-D", "bake.adaptive=sometimes"], &["sometimes", "paper", "middle"]),
         (&["--sun-path", "sun.csv", "--date", "2026-06-21"], &["--sun-path", "--date"]),
         (&["--sun-path", "sun.txt"], &["sun.txt", ".csv", ".toml"]),
@@ -275,6 +278,36 @@ fn steps_that_are_left_out_are_the_same_for_all_shards_and_change_little() {
     assert!(error < 0.15, "{error}");
     let pdiff = ["-D", "bake.adaptive=middle", "-D", "bake.measure=pdiff"];
     lab.view("pdiff.day", &[&day[..], &pdiff].concat()).expect(0, &["lit steps are needed"]);
+}
+
+#[test]
+fn sun_masks_change_little_and_are_the_same_for_all_shards_and_with_steps_left_out() {
+    if !device() {
+        return;
+    }
+    let lab = Lab::new();
+    let day = ["-D", "bake.interval=20", "-D", "bake.tile=8", "-D", "bake.samples=64", "-D", "bake.probes=3"];
+    let masks = [&day[..], &["-D", "bake.sun_masks=0.1"]].concat();
+    lab.view("exact.day", &day).expect(0, &[]);
+    lab.view("masks.day", &masks).expect(0, &["sun masks of", "0.1 m apart", "bytes"]);
+    let shot = |bake: &str, out: &str| {
+        lab.irradiance(out, &["--builtin", "primitives", "--size", "16x12", "--bake", bake, "--time", "10:00"])
+    };
+    let (exact, found) = (shot("exact.day", "a.exr"), shot("masks.day", "b.exr"));
+    let (error, light) = (apart(&found, &exact), mean(&found) / mean(&exact));
+    println!("masks: {error:.3} off, {light:.4} of the light");
+    assert!(error < 0.1 && (light - 1.0).abs() < 0.02, "{error} {light}");
+    for adaptive in ["bake.adaptive=off", "bake.adaptive=every"] {
+        let words = [&masks[..], &["-D", adaptive]].concat();
+        lab.view("whole.day", &words).expect(0, &[]);
+        let whole = fs::read(lab.at("whole.day")).unwrap();
+        for shard in ["2/2", "1/2"] {
+            lab.view("shards.day", &[&words[..], &["--shard", shard]].concat()).expect(0, &[]);
+        }
+        lab.view("shards.day", &words).expect(0, &[]);
+        assert!(fs::read(lab.at("shards.day")).unwrap() == whole, "{adaptive}");
+        ["whole.day", "shards.day"].iter().for_each(|name| fs::remove_file(lab.at(name)).unwrap());
+    }
 }
 
 #[test]

@@ -1,15 +1,16 @@
-//! Sun masks: at which times of the day the sun is seen from the cells of all triangles (`shaders-glsl/daylight/masks.glsl`). With them a vertex of a
-//! path reads a bit for each time instead of tracing a ray. The visibility of a cell is that of one random point in it.
+//! Sun masks: at which times of the day the sun is seen from both sides of the cells of all triangles (`shaders-glsl/daylight/masks.glsl`). With
+//! them a vertex of a path reads a bit for each time instead of tracing a ray. The visibility of a side of a cell is that of one random point in it
+//! that is not under a thing.
 
 use std::mem::offset_of;
 
 use glam::Vec3;
 
-use super::{Baking, Plan, lightmap::placed};
+use super::{Baking, Plan, Transport, lightmap::placed};
 use crate::{
     Error, Result,
     gpu::{BufferDesc, Gpu, OwnedBuffer},
-    graph::{Buffer, Graph, Uniform},
+    graph::{Buffer, Graph, Items, Uniform},
     rays::{RayHandles, traced},
     resident,
     scene::{Pose, Scene},
@@ -21,6 +22,8 @@ use crate::{
 
 /// Bytes of all bits, and of the cells of all triangles, at most: every device allows buffers of 128 MiB.
 const MOST_BYTES: u64 = 128 << 20;
+/// Largest distance of points, metres: that of the setting.
+const WIDEST: f32 = 1000.0;
 /// Columns and rows of a triangle at most.
 const MOST_SIDE: f32 = 32_767.0;
 
@@ -49,8 +52,9 @@ impl Cells {
         let count = corners.cells(spacing);
         let triangles = corners.of_instances.iter().map(Vec::len).sum::<usize>() * size_of::<types::DayCells>();
         if triangles as u64 > MOST_BYTES {
-            let error = Error::usage("the scene has too many triangles for masks").at("bake.sun_masks");
-            return Err(error.help("0 asks for exact shadow rays"));
+            let [found, most] = [triangles as u64, MOST_BYTES].map(|bytes| bytes / size_of::<types::DayCells>() as u64);
+            let what = format!("masks of {found} triangles; at most {most} are allowed");
+            return Err(Error::usage(what).at("bake.sun_masks").help("0 asks for exact shadow rays"));
         }
         if count <= most {
             return Ok(corners.divided(spacing));
@@ -58,10 +62,10 @@ impl Cells {
         let what = format!("{spacing} m: {count} points for {times} times; at most {most} are allowed");
         let error = Error::usage(what).at("bake.sun_masks");
         let mut wider = spacing;
-        while corners.cells(wider) > most && wider < 1e6 {
+        while corners.cells(wider) > most && wider < WIDEST {
             wider *= 1.1;
         }
-        Err(match corners.cells(wider) <= most {
+        Err(match wider < WIDEST {
             true => error.help(format!("Choose at least {} m, or 0 for exact shadow rays", up(wider))),
             false => error.help("The scene has too many triangles for masks; 0 asks for exact shadow rays"),
         })
@@ -73,9 +77,9 @@ impl Cells {
     }
 }
 
-/// A bit for each time, in whole words.
+/// A bit for each side and time, in whole words.
 fn bytes_of_cell(times: usize) -> u64 {
-    4 * words(times) as u64
+    8 * u64::from(words(times))
 }
 
 fn words(times: usize) -> u32 {
@@ -88,7 +92,7 @@ fn up(metres: f32) -> f32 {
     ((metres / unit).ceil() * unit * 1e6).round() / 1e6
 }
 
-/// The corners of all triangles in the world, metres.
+/// The corners of all triangles in the world, metres. Those of meshes that bend are the corners before, which decides the size of their cells alone.
 struct Corners {
     of_instances: Vec<Vec<[Vec3; 3]>>,
 }
@@ -150,7 +154,8 @@ impl Grid {
         // A triangle without an area, or with corners that are not finite, has one cell.
         let foot = if foot.is_finite() { foot } else { 0.0 };
         let height = (to_apex - foot * along).length();
-        let steps = |metres: f32| (metres / spacing).ceil().clamp(1.0, MOST_SIDE) as u32;
+        // The larger of a number and NaN is the number.
+        let steps = |metres: f32| (metres / spacing).ceil().max(1.0).min(MOST_SIDE) as u32;
         Self { base: base as u32, columns: steps(length), rows: steps(height), foot }
     }
 }
@@ -161,7 +166,7 @@ pub(super) struct Masks {
     cells: OwnedBuffer,
     firsts: OwnedBuffer,
     bits: OwnedBuffer,
-    /// Two bits for each cell: whether the masks of its sides are there.
+    /// A bit for each side of a cell: whether its mask is there.
     known: OwnedBuffer,
     count: u32,
     triangles: u32,
@@ -188,10 +193,19 @@ pub(super) struct Handles {
 }
 
 impl Masks {
-    /// No mask is computed. Exact shadow rays have empty buffers: the passes of both ways have the same ones.
+    /// For exact shadow rays: the passes of both ways have the same buffers.
+    pub fn none(gpu: &Gpu) -> Result<Self> {
+        Self::of(gpu, Cells::default(), (0.0, 0))
+    }
+
+    /// Masks of which none is computed.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> Result<Self> {
         let times = plan.times.len();
-        let Cells { mut triangles, mut firsts, count } = Cells::new(scene, &plan.settings, times)?;
+        Self::of(gpu, Cells::new(scene, &plan.settings, times)?, (plan.settings.sun_masks, times))
+    }
+
+    fn of(gpu: &Gpu, cells: Cells, (spacing, times): (f32, usize)) -> Result<Self> {
+        let Cells { mut triangles, mut firsts, count } = cells;
         let (of_all, instances) = (triangles.len() as u32, firsts.len() as u32);
         triangles.push(types::DayCells::default());
         firsts.push(of_all);
@@ -200,20 +214,15 @@ impl Masks {
         Ok(Self {
             cells: OwnedBuffer::with_contents(gpu, "daylight.cells", bytemuck::cast_slice(&triangles))?,
             firsts: OwnedBuffer::with_contents(gpu, "daylight.cell-firsts", bytemuck::cast_slice(&firsts))?,
-            bits: zeros("daylight.sun-masks", u64::from(count) * u64::from(words))?,
+            bits: zeros("daylight.sun-masks", 2 * u64::from(count) * u64::from(words))?,
             known: zeros("daylight.known-masks", (2 * u64::from(count)).div_ceil(32))?,
             count,
             triangles: of_all,
             instances,
-            spacing: plan.settings.sun_masks,
+            spacing,
             words,
             unclear: true,
         })
-    }
-
-    /// Words of a cell; 0: the plan wants exact shadow rays.
-    pub fn words_for(&self, plan: &Plan) -> u32 {
-        if plan.settings.sun_masks > 0.0 { self.words } else { 0 }
     }
 
     /// The buffers for a graph whose paths have at most `vertices` vertices.
@@ -226,8 +235,7 @@ impl Masks {
         }
         let most = vertices.min(2 * u64::from(self.count)).max(1);
         let wanted = graph.buffer("daylight.wanted-masks", 4 * most);
-        // Groups of 64 times.
-        let asks = types::DayAsks { point_groups: [0, 1, 1], ray_groups: [0, self.words.div_ceil(2), 1], count: 0 };
+        let asks = types::DayAsks { point_groups: [0, 1, 1], ray_groups: [0, 1, 1], count: 0 };
         let asks = graph.buffer_from("daylight.asks", &[asks]);
         Handles { cells, cell_firsts, bits, known, wanted, asks, most }
     }
@@ -239,7 +247,7 @@ impl Masks {
         (settings, suns): (Uniform<types::DaySettings>, Buffer),
         (handles, rays): (&resident::Handles, RayHandles),
         masks: Handles,
-        vertices: u64,
+        (vertices, most_turns): (u64, u64),
     ) {
         let Handles { cells, cell_firsts, bits, wanted, asks, most, .. } = masks;
         let mask_points = graph.buffer("daylight.mask-points", most * size_of::<types::DayMaskPoint>() as u64);
@@ -248,9 +256,23 @@ impl Masks {
         let args =
             traced!(mask_points::Args { settings, wanted, asks, mask_points, cells, cell_firsts, push }, rays, handles);
         graph.compute_indirect(args, asks, offset_of!(types::DayAsks, point_groups) as u64).rays(vertices);
-        let args = traced!(sun_masks::Args { settings, suns, mask_points, asks, bits }, rays);
-        let of_vertex = 16 * u64::from(self.words);
-        graph.compute_indirect(args, asks, offset_of!(types::DayAsks, ray_groups) as u64).rays(vertices * of_vertex);
+        let push = sun_masks::Push { first: 0, count: 1 };
+        let args = traced!(sun_masks::Args { settings, suns, mask_points, asks, bits, push }, rays);
+        let items = Items::new(self.words.div_ceil(2)).rays(32 * vertices).turns(most_turns);
+        graph.compute_indirect_over(args, (asks, offset_of!(types::DayAsks, ray_groups) as u64), items);
+    }
+}
+
+impl Transport {
+    /// Words of a side of a cell of the masks, which are made the first time; 0: the plan wants exact shadow rays.
+    pub(super) fn mask_words(&mut self, plan: &Plan) -> Result<u32> {
+        if plan.settings.sun_masks <= 0.0 {
+            return Ok(0);
+        }
+        if self.masks.words == 0 {
+            self.masks = Masks::new(&self.gpu, &self.scene, plan)?;
+        }
+        Ok(self.masks.words)
     }
 }
 

@@ -1,7 +1,8 @@
 //! The light of a tile for all times of the day, by paths that all times share (`shaders-glsl/daylight`).
 //!
 //! A path starts at a texel and ends in the sky or after some scatterings. Its vertices do not depend on the time, so each vertex sends one
-//! shadow ray to each position of the sun: a day costs one set of paths and many coherent shadow rays, instead of a set of paths for each time.
+//! shadow ray to each position of the sun, or reads its visibility from a mask ([`super::masks`]). A day costs one set of paths and many coherent
+//! shadow rays, instead of a set of paths for each time. Late vertices send shadow rays with a probability.
 //! Light is linear in the sun, so the sun is white and has an irradiance of 1 W/m² at normal incidence.
 
 use super::{
@@ -39,7 +40,7 @@ const BATCH: u32 = 16;
 pub(super) const LAMP_TURNS: u64 = 64;
 /// Texels of [`Transport::sparse`], about.
 const SPARSE: usize = 2048;
-/// Vertices of a batch at most: 118 MB, because every device allows buffers of 128 MiB.
+/// Vertices of a batch at most: 117 MB, because every device allows buffers of 128 MiB.
 const MOST_VERTICES: u64 = 1 << 21;
 
 /// The scene of a bake on a device.
@@ -105,7 +106,7 @@ impl Transport {
     /// Uploads the scene without its own suns and sky.
     ///
     /// # Errors
-    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits; `Usage` as [`super::Cells::new`].
+    /// `OutOfMemory`, `DeviceLost`; `Runtime` if the scene is larger than the device's limits.
     pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan, sources: Sources) -> Result<Self> {
         let (scene, groups) = with_lamps(scene, &plan.lamps);
         let pose = Pose::rest(&scene);
@@ -113,7 +114,7 @@ impl Transport {
         let groups = OwnedBuffer::with_contents(gpu, "daylight.groups", bytemuck::cast_slice(&groups))?;
         let rays = Rays::new(gpu, &scene, &resident)?;
         let suns = suns_of(gpu, plan)?;
-        let masks = Masks::new(gpu, &scene, plan)?;
+        let masks = Masks::none(gpu)?;
         Ok(Self {
             gpu: gpu.clone(),
             runner: Runner::new(gpu),
@@ -209,7 +210,7 @@ impl Transport {
     /// `OutOfMemory`, `DeviceLost`.
     pub fn follow(&mut self, plan: &Plan) -> Result<()> {
         self.suns = suns_of(&self.gpu, plan)?;
-        self.masks = Masks::new(&self.gpu, &self.scene, plan)?;
+        self.masks = Masks::none(&self.gpu)?;
         Ok(())
     }
 
@@ -273,7 +274,7 @@ impl Transport {
             return Ok(Light::default());
         }
         let times = plan.times.len() as u32;
-        let mask_words = self.masks.words_for(plan);
+        let mask_words = self.mask_words(plan)?;
         let vertices = u64::from(count) * u64::from(consts::DAY_VERTICES);
         let batch = (MOST_VERTICES / vertices).clamp(1, BATCH.into()) as u32;
         let buffer = |name, bytes: u64| OwnedBuffer::new(&self.gpu, name, BufferDesc::device(bytes.max(16)));
@@ -337,7 +338,13 @@ impl Transport {
                 let suns = graph.import_buffer(&self.suns);
                 if mask_words > 0 {
                     let of_vertices = u64::from(paths) * bounces.div_ceil(2);
-                    self.masks.compute(&mut graph, (settings, suns), (&handles, rays), masks, of_vertices);
+                    self.masks.compute(
+                        &mut graph,
+                        (settings, suns),
+                        (&handles, rays),
+                        masks,
+                        (of_vertices, most_turns),
+                    );
                 }
                 let args = traced!(
                     suns::Args {
@@ -352,7 +359,6 @@ impl Transport {
                     },
                     rays
                 );
-                // About half of all vertices are there, and half of them face the sun.
                 let items = sun_items([count, times, now], bounces, mask_words, most_turns);
                 graph.compute_over(args, [times, count], items);
             }

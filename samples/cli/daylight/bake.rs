@@ -6,7 +6,7 @@ use lucerna::{
     Result,
     gpu::Gpu,
     image,
-    techniques::daylight::{Baking, Kind, Sources, Stored, Transport, units},
+    techniques::daylight::{Baking, Cells, Kind, Sources, Stored, Transport, units},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -112,6 +112,11 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let mut transport = Transport::new(&gpu, &stage.scene, &plan, sources)?;
     let adaptive = thin_out(&mut plan, &mut transport)?;
     adaptive.iter().for_each(|(said, _)| console.info(said));
+    let masks = Cells::new(&stage.scene, &plan.settings, plan.times.len())?;
+    if masks.count > 0 {
+        let (points, spacing, bytes) = (masks.count, plan.settings.sun_masks, masks.bytes(plan.times.len()));
+        console.info(&format!("sun masks of {points} points, {spacing} m apart: {bytes} bytes of the device's memory"));
+    }
     let store = args.run.units.store(&folder, units::job(&plan, &device, of_tiles.as_deref())?, console)?;
     let skies = units::skies(&plan)?;
     let unit = |unit: lucerna::bake::UnitId, _: lucerna::bake::Needed<'_>| {

@@ -378,11 +378,9 @@ fn planned(
         settings: baking.clone(),
     };
     plan.check_whole()?;
-    let masks = Cells::new(scene, &plan.settings, plan.times.len())?;
-    if masks.count > 0 {
-        let (spacing, points) = (plan.settings.sun_masks, masks.count);
-        let bytes = masks.bytes(plan.times.len());
-        notes.push(format!("sun masks at {points} points, {spacing} m apart: {bytes} bytes of the device's memory"));
+    // Else the number of times is not known yet.
+    if plan.settings.adaptive == Adaptive::Off {
+        Cells::new(scene, &plan.settings, plan.times.len())?;
     }
     Ok(Planned { plan, sources, corners, notes })
 }

@@ -130,7 +130,7 @@ impl Transport {
     ) -> Result<Vec<types::DayStart>> {
         let (count, times) = (positions.len() as u32, plan.times.len() as u32);
         let groups = plan.lamps.len();
-        let mask_words = if lit { self.masks.words_for(plan) } else { 0 };
+        let mask_words = if lit { self.mask_words(plan)? } else { 0 };
         let mut graph = Graph::new("daylight.probes");
         let handles = self.resident.frame_in(&mut graph, &self.scene, &self.pose);
         let rays = self.rays.frame(&mut graph, &handles);
@@ -176,7 +176,13 @@ impl Transport {
                 let suns = graph.import_buffer(&self.suns);
                 if mask_words > 0 {
                     let of_vertices = u64::from(paths) * bounces.div_ceil(2);
-                    self.masks.compute(&mut graph, (settings, suns), (&handles, rays), masks, of_vertices);
+                    self.masks.compute(
+                        &mut graph,
+                        (settings, suns),
+                        (&handles, rays),
+                        masks,
+                        (of_vertices, most_turns),
+                    );
                 }
                 let args = traced!(
                     probe_suns::Args {
