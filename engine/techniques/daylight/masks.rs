@@ -154,8 +154,8 @@ impl Grid {
         // A triangle without an area, or with corners that are not finite, has one cell.
         let foot = if foot.is_finite() { foot } else { 0.0 };
         let height = (to_apex - foot * along).length();
-        // The larger of a number and NaN is the number.
-        let steps = |metres: f32| (metres / spacing).ceil().max(1.0).min(MOST_SIDE) as u32;
+        // Corners that are not finite count as one step.
+        let steps = |metres: f32| if metres > spacing { (metres / spacing).ceil().min(MOST_SIDE) as u32 } else { 1 };
         Self { base: base as u32, columns: steps(length), rows: steps(height), foot }
     }
 }
