@@ -47,6 +47,9 @@ fn masks_have_the_light_of_shadow_rays_at_all_times() {
             let brightest = exact.iter().copied().fold(0.0, f64::max);
             let (all_exact, all_masks) = (exact.iter().sum::<f64>(), masks.iter().sum::<f64>());
             assert!((all_masks / all_exact - 1.0).abs() < 0.01, "the day: {all_masks} of {all_exact}");
+            let ratios = || exact.iter().zip(&masks).map(|(exact, masks)| masks / exact);
+            let (least, most) = (ratios().fold(2.0, f64::min), ratios().fold(0.0, f64::max));
+            println!("light of masks: {:.4}, at single times {least:.4} to {most:.4}", all_masks / all_exact);
             for (time, (exact, masks)) in exact.iter().zip(&masks).enumerate() {
                 assert!((masks - exact).abs() < 0.02 * brightest.min(2.0 * exact), "time {time}: {masks} of {exact}");
             }

@@ -35,7 +35,7 @@ struct DayVertex {
     vec3 normal;     // shading normal, unit
     vec3 geometric;  // of the triangle, unit, on the side of the normal
     vec3 weight;     // irradiance at the receiver for each W/m² of irradiance at the vertex
-    float sun;       // factor on the light of the sun: 1 / the probability with which the vertex asks for it; 0: it does not ask
+    float sun;       // factor on the light of the sun: 1 / the probability of its shadow rays; 0: it sends none
     uint side;       // of a cell of the sun masks, if there are any (daylight/masks.glsl)
 };
 
@@ -51,8 +51,8 @@ struct DayCells {
 const uint DAY_MASK_GROUP = 64u;
 const uint DAY_MASK_ROW = 32768u;
 
-// The masks that the paths of a batch ask for.
-struct DayAsks {
+// The masks that the paths of a batch request.
+struct DayRequests {
     uvec3 point_groups;  // that choose the points
     uvec3 ray_groups;    // points of a row, 1, rows
     uint count;          // of sides of cells

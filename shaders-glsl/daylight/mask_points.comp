@@ -1,4 +1,4 @@
-// Chooses the points of the sun masks that paths ask for. A point under a thing that stands on a surface, or in a wall that stands in it, would make
+// Chooses the points of the sun masks that paths request. A point under a thing that stands on a surface, or in a wall that stands in it, would make
 // the mask of its whole cell dark. So each of a few random points sends a few rays, and the first point from which one of them comes to
 // something is taken.
 #version 460
@@ -17,7 +17,7 @@ layout(local_size_x = 64) in; // DAY_MASK_GROUP
 
 layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
 layout(binding = 9, scalar) readonly buffer Wanted { uint wanted[]; };  // as in daylight/walk.glsl
-layout(binding = 10, scalar) readonly buffer Asks { DayAsks asks; };
+layout(binding = 10, scalar) readonly buffer Requests { DayRequests requests; };
 layout(binding = 12, scalar) writeonly buffer MaskPoints { DayMaskPoint points[]; };
 layout(binding = 13, scalar) readonly buffer Cells { DayCells cells[]; };
 layout(binding = 14, scalar) readonly buffer CellFirsts { uint cell_firsts[]; };
@@ -69,9 +69,9 @@ bool is_long(vec3 from, vec3 direction, uint salt) {
 }
 
 void main() {
-    uint ask = gl_GlobalInvocationID.x;
-    if (ask >= asks.count) return;
-    uint side = wanted[ask];
+    uint request = gl_GlobalInvocationID.x;
+    if (request >= requests.count) return;
+    uint side = wanted[request];
     uint cell = side >> 1u;
     bool back = (side & 1u) != 0u;
     uint of_all = triangle_of(cell);
@@ -95,5 +95,5 @@ void main() {
         }
         if (found) first = candidate;
     }
-    points[ask] = first;
+    points[request] = first;
 }

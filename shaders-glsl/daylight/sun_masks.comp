@@ -1,4 +1,4 @@
-// At which times of the day the sun is seen from points: a bit for each time in the masks of their sides of cells. Invocations side by side have the same
+// At which times of the day the sun is seen from points: a bit for each time in the mask of a side of a cell. Invocations side by side have the same
 // point and neighbouring times, so that their rays stay together.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
@@ -15,7 +15,7 @@ layout(local_size_x = 1, local_size_y = 64) in;
 layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
 layout(binding = 8, scalar) readonly buffer Suns { vec4 suns[]; };  // as for day_sun_ray()
 layout(binding = 9, scalar) readonly buffer MaskPoints { DayMaskPoint points[]; };
-layout(binding = 10, scalar) readonly buffer Asks { DayAsks asks; };
+layout(binding = 10, scalar) readonly buffer Requests { DayRequests requests; };
 layout(binding = 12, scalar) buffer Bits { uint bits[]; };
 
 #include "daylight/sun_ray.glsl"
@@ -26,9 +26,9 @@ layout(push_constant, scalar) uniform Push {
 };
 
 void main() {
-    uint ask = gl_WorkGroupID.z * DAY_MASK_ROW + gl_WorkGroupID.x;
-    if (ask >= asks.count) return;
-    DayMaskPoint point = points[ask];
+    uint request = gl_WorkGroupID.z * DAY_MASK_ROW + gl_WorkGroupID.x;
+    if (request >= requests.count) return;
+    DayMaskPoint point = points[request];
     for (uint group = first; group < first + count; ++group) {
         uint time = 64u * group + gl_LocalInvocationID.y;
         if (time >= settings.times) return;

@@ -30,27 +30,27 @@ layout(binding = 10, scalar) writeonly buffer Escapes { DayEscape escapes[]; };
 layout(binding = 11, scalar) writeonly buffer Counts { uint counts[]; };
 layout(binding = 15, scalar) readonly buffer Cells { DayCells cells[]; };
 layout(binding = 16, scalar) readonly buffer CellFirsts { uint cell_firsts[]; };
-// A bit for each side of a cell: whether its mask is there, or asked for.
+// A bit for each side of a cell: whether its mask is there, or requested.
 layout(binding = 17, scalar) coherent buffer Known { uint known[]; };
 // Sides of cells: those that are new.
 layout(binding = 18, scalar) writeonly buffer Wanted { uint wanted[]; };
-layout(binding = 19, scalar) buffer Asks { DayAsks asks; };
+layout(binding = 19, scalar) buffer Requests { DayRequests requests; };
 
 #include "daylight/masks.glsl"
 
-// The sun is asked for with a probability of 1 by vertices that carry at least this share of the light of the first vertex of their path. A
-// vertex costs a ray for each time of the day, and late vertices carry little.
-const float DAY_ASK = 0.5;
+// Russian roulette of shadow rays: vertices that carry less than this share of the light of the first vertex of their path send them with a
+// probability. A vertex costs a ray for each time of the day, and late vertices carry little light.
+const float SHADOW_ROULETTE = 0.5;
 
-// Asks for a mask if it is not there.
-void want_mask(uint side) {
+// Requests a mask if it is not there.
+void request_mask(uint side) {
     uint bit = 1u << (side & 31u);
     if ((known[side >> 5u] & bit) != 0u || (atomicOr(known[side >> 5u], bit) & bit) != 0u) return;
-    uint at = atomicAdd(asks.count, 1u);
+    uint at = atomicAdd(requests.count, 1u);
     wanted[at] = side;
-    atomicMax(asks.point_groups.x, at / DAY_MASK_GROUP + 1u);
-    atomicMax(asks.ray_groups.x, min(at + 1u, DAY_MASK_ROW));
-    atomicMax(asks.ray_groups.z, at / DAY_MASK_ROW + 1u);
+    atomicMax(requests.point_groups.x, at / DAY_MASK_GROUP + 1u);
+    atomicMax(requests.ray_groups.x, min(at + 1u, DAY_MASK_ROW));
+    atomicMax(requests.ray_groups.z, at / DAY_MASK_ROW + 1u);
 }
 
 void main() {
@@ -87,7 +87,7 @@ void main() {
         bool alive = dot(direction, s.side) > 0.0;
 #endif
         uint sharp = 0u;
-        float leading = 0.0;
+        float first_largest = 0.0;
         for (uint surface = 1u; alive; ++surface) {
             uint salt = pcg4d(uvec4(of_bake, number, surface, settings.seed)).x;
             Hit hit = trace(Ray(origin, 0.0, direction, 1e30), TRACE_SHADOW, salt, false);
@@ -133,15 +133,15 @@ void main() {
             }
             weight *= s.albedo;
             float largest = brightest(weight) / SAMPLING_PI;
-            if (count == 0u) leading = largest;
+            if (count == 0u) first_largest = largest;
             float sun = 1.0;
             uint side = 0u;
             if (settings.mask_words != 0u) {
                 side = 2u * day_cell(hit.instance, hit.triangle, hit.barycentrics) + (s.front ? 0u : 1u);
-                want_mask(side);
-            } else if (largest < DAY_ASK * leading) {
-                float ask = largest / (DAY_ASK * leading);
-                sun = unit_float(pcg4d(uvec4(salt, 5u, 6u, 7u)).x) < ask ? 1.0 / ask : 0.0;
+                request_mask(side);
+            } else if (largest < SHADOW_ROULETTE * first_largest) {
+                float stay = largest / (SHADOW_ROULETTE * first_largest);
+                sun = unit_float(pcg4d(uvec4(salt, 5u, 6u, 7u)).x) < stay ? 1.0 / stay : 0.0;
             }
             vertices[path * DAY_VERTICES + count] = DayVertex(above, s.normal, s.side, weight / SAMPLING_PI, sun, side);
             ++count;

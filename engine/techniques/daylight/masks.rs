@@ -34,6 +34,7 @@ pub struct Cells {
     pub triangles: Vec<types::DayCells>,
     /// The first triangle of each instance.
     pub firsts: Vec<u32>,
+    /// Cells of all triangles; each has a mask for either side.
     pub count: u32,
 }
 
@@ -92,7 +93,8 @@ fn up(metres: f32) -> f32 {
     ((metres / unit).ceil() * unit * 1e6).round() / 1e6
 }
 
-/// The corners of all triangles in the world, metres. Those of meshes that bend are the corners before, which decides the size of their cells alone.
+/// The corners of all triangles in the world, metres. Meshes that bend have the corners from before they bend. Only the size of their cells follows
+/// from these.
 struct Corners {
     of_instances: Vec<Vec<[Vec3; 3]>>,
 }
@@ -160,7 +162,7 @@ impl Grid {
     }
 }
 
-/// The masks of a bake on its device. A mask is computed when the first path asks for it, so that a bake of few texels computes few.
+/// The masks of a bake on its device. A mask is computed when the first path requests for it, so that a bake of few texels computes few.
 #[derive(Debug)]
 pub(super) struct Masks {
     cells: OwnedBuffer,
@@ -176,7 +178,7 @@ pub(super) struct Masks {
     /// Of 32 times each.
     words: u32,
     /// Whether `bits` and `known` have to be cleared.
-    pub unclear: bool,
+    pub dirty: bool,
 }
 
 /// The buffers of masks in a graph.
@@ -187,9 +189,11 @@ pub(super) struct Handles {
     pub bits: Buffer,
     pub known: Buffer,
     pub wanted: Buffer,
-    pub asks: Buffer,
-    /// Masks that may be asked for.
+    pub requests: Buffer,
+    /// Masks that may be requested.
     most: u64,
+    /// 0: no masks are wanted.
+    words: u32,
 }
 
 impl Masks {
@@ -221,45 +225,55 @@ impl Masks {
             instances,
             spacing,
             words,
-            unclear: true,
+            dirty: true,
         })
     }
 
-    /// The buffers for a graph whose paths have at most `vertices` vertices.
-    pub fn frame(&self, graph: &mut Graph, vertices: u64) -> Handles {
+    /// The buffers for a graph whose paths have at most `vertices` vertices. `words`: [`Transport::mask_words`].
+    pub fn frame(&self, graph: &mut Graph, vertices: u64, words: u32) -> Handles {
         let [cells, cell_firsts, bits, known] =
             [&self.cells, &self.firsts, &self.bits, &self.known].map(|buffer| graph.import_buffer(buffer));
-        if self.unclear {
+        if self.dirty {
             graph.fill(bits, 0);
             graph.fill(known, 0);
         }
         let most = vertices.min(2 * u64::from(self.count)).max(1);
         let wanted = graph.buffer("daylight.wanted-masks", 4 * most);
-        let asks = types::DayAsks { point_groups: [0, 1, 1], ray_groups: [0, 1, 1], count: 0 };
-        let asks = graph.buffer_from("daylight.asks", &[asks]);
-        Handles { cells, cell_firsts, bits, known, wanted, asks, most }
+        let requests = types::DayRequests { point_groups: [0, 1, 1], ray_groups: [0, 1, 1], count: 0 };
+        let requests = graph.buffer_from("daylight.requests", &[requests]);
+        Handles { cells, cell_firsts, bits, known, wanted, requests, most, words }
     }
 
-    /// The passes that compute the masks that the paths of the pass before asked for. `vertices`: of these paths, about.
+    /// The passes that compute the masks that the paths of the pass before requested; none without masks. `paths`: their number and their
+    /// maximum number of vertices.
     pub fn compute(
         &self,
         graph: &mut Graph,
         (settings, suns): (Uniform<types::DaySettings>, Buffer),
         (handles, rays): (&resident::Handles, RayHandles),
         masks: Handles,
-        (vertices, most_turns): (u64, u64),
+        (paths, most_turns): ([u64; 2], u64),
     ) {
-        let Handles { cells, cell_firsts, bits, wanted, asks, most, .. } = masks;
+        let Handles { cells, cell_firsts, bits, wanted, requests, most, words, .. } = masks;
+        if words == 0 {
+            return;
+        }
+        // About half of all vertices are there.
+        let vertices = paths[0] * paths[1].div_ceil(2);
         let mask_points = graph.buffer("daylight.mask-points", most * size_of::<types::DayMaskPoint>() as u64);
         let (triangles, instances) = (self.triangles, self.instances);
         let push = mask_points::Push { triangles, instances, spacing: self.spacing };
-        let args =
-            traced!(mask_points::Args { settings, wanted, asks, mask_points, cells, cell_firsts, push }, rays, handles);
-        graph.compute_indirect(args, asks, offset_of!(types::DayAsks, point_groups) as u64).rays(vertices);
+        let args = traced!(
+            mask_points::Args { settings, wanted, requests, mask_points, cells, cell_firsts, push },
+            rays,
+            handles
+        );
+        graph.compute_indirect(args, requests, offset_of!(types::DayRequests, point_groups) as u64).rays(vertices);
         let push = sun_masks::Push { first: 0, count: 1 };
-        let args = traced!(sun_masks::Args { settings, suns, mask_points, asks, bits, push }, rays);
-        let items = Items::new(self.words.div_ceil(2)).rays(32 * vertices).turns(most_turns);
-        graph.compute_indirect_over(args, (asks, offset_of!(types::DayAsks, ray_groups) as u64), items);
+        let args = traced!(sun_masks::Args { settings, suns, mask_points, requests, bits, push }, rays);
+        // The shader has groups of 64 times.
+        let items = Items::new(words.div_ceil(2)).rays(32 * vertices).turns(most_turns);
+        graph.compute_indirect_over(args, (requests, offset_of!(types::DayRequests, ray_groups) as u64), items);
     }
 }
 

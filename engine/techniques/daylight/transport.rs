@@ -2,7 +2,8 @@
 //!
 //! A path starts at a texel and ends in the sky or after some scatterings. Its vertices do not depend on the time, so each vertex sends one
 //! shadow ray to each position of the sun, or reads its visibility from a mask ([`super::masks`]). A day costs one set of paths and many coherent
-//! shadow rays, instead of a set of paths for each time. Late vertices send shadow rays with a probability.
+//! shadow rays, instead of a set of paths for each time. Russian roulette decides whether late vertices send
+//! their shadow rays.
 //! Light is linear in the sun, so the sun is white and has an irradiance of 1 W/m² at normal incidence.
 
 use super::{
@@ -197,7 +198,7 @@ impl Transport {
                 (hits, mask, Some(extent))
             }
         };
-        // Few paths need fewer shadow rays than masks.
+        // So few paths send fewer shadow rays than masks need.
         let samples = plan.settings.samples.min(SPARSE_PATHS);
         let settings = Baking { samples, sun_masks: 0.0, ..plan.settings.clone() };
         let light = self.gather(&Plan { settings, lamps: Vec::new(), ..plan.clone() }, 0, &hits)?;
@@ -263,7 +264,7 @@ impl Transport {
     pub(super) fn run(&mut self, graph: &Graph) -> Result<Frame> {
         let done = self.runner.run(graph);
         // After a run that ended early, masks are known that were not computed.
-        self.masks.unclear = done.is_err();
+        self.masks.dirty = done.is_err();
         done
     }
 
@@ -305,7 +306,7 @@ impl Transport {
             let sun_sums = graph.import_buffer(&sun_sums);
             let sky_sums = graph.import_buffer(&sky_sums);
             let lamp_sums = graph.import_buffer(&lamp_sums);
-            let masks = self.masks.frame(&mut graph, paths * u64::from(consts::DAY_VERTICES));
+            let masks = self.masks.frame(&mut graph, paths * u64::from(consts::DAY_VERTICES), mask_words);
             if first_sample == 0 {
                 graph.fill(sun_sums, 0);
                 graph.fill(sky_sums, 0);
@@ -325,7 +326,7 @@ impl Transport {
                     cell_firsts: masks.cell_firsts,
                     known: masks.known,
                     wanted: masks.wanted,
-                    asks: masks.asks,
+                    requests: masks.requests,
                     spots,
                 },
                 rays,
@@ -336,16 +337,8 @@ impl Transport {
             graph.compute(args, paths).rays(u64::from(paths) * bounces);
             if times > 0 {
                 let suns = graph.import_buffer(&self.suns);
-                if mask_words > 0 {
-                    let of_vertices = u64::from(paths) * bounces.div_ceil(2);
-                    self.masks.compute(
-                        &mut graph,
-                        (settings, suns),
-                        (&handles, rays),
-                        masks,
-                        (of_vertices, most_turns),
-                    );
-                }
+                let most = ([paths.into(), bounces], most_turns);
+                self.masks.compute(&mut graph, (settings, suns), (&handles, rays), masks, most);
                 let args = traced!(
                     suns::Args {
                         settings,

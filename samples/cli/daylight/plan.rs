@@ -378,7 +378,7 @@ fn planned(
         settings: baking.clone(),
     };
     plan.check_whole()?;
-    // Else the number of times is not known yet.
+    // Where steps are left out, the number of times is known later.
     if plan.settings.adaptive == Adaptive::Off {
         Cells::new(scene, &plan.settings, plan.times.len())?;
     }

@@ -144,7 +144,7 @@ impl Transport {
         let positions: Vec<[f32; 3]> = positions.iter().map(|position| position.to_array()).collect();
         let probes = graph.buffer_from("daylight.probes", &positions);
         let paths = count * now;
-        let masks = self.masks.frame(&mut graph, u64::from(paths) * u64::from(consts::DAY_VERTICES));
+        let masks = self.masks.frame(&mut graph, u64::from(paths) * u64::from(consts::DAY_VERTICES), mask_words);
         let args = traced!(
             probe_walk::Args {
                 settings,
@@ -157,7 +157,7 @@ impl Transport {
                 cell_firsts: masks.cell_firsts,
                 known: masks.known,
                 wanted: masks.wanted,
-                asks: masks.asks,
+                requests: masks.requests,
             },
             rays,
             handles
@@ -174,16 +174,8 @@ impl Transport {
             }
             if times > 0 {
                 let suns = graph.import_buffer(&self.suns);
-                if mask_words > 0 {
-                    let of_vertices = u64::from(paths) * bounces.div_ceil(2);
-                    self.masks.compute(
-                        &mut graph,
-                        (settings, suns),
-                        (&handles, rays),
-                        masks,
-                        (of_vertices, most_turns),
-                    );
-                }
+                let most = ([paths.into(), bounces], most_turns);
+                self.masks.compute(&mut graph, (settings, suns), (&handles, rays), masks, most);
                 let args = traced!(
                     probe_suns::Args {
                         settings,
