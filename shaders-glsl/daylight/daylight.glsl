@@ -26,6 +26,7 @@ struct DaySettings {
     uint lights;          // of the scene
     uint groups;          // of lamps
     float sun_radius;     // tangent of the angular radius of the sun's disc
+    float touching;       // metres: surfaces that are nearer to a texel of a lightmap bury it
     uint mask_words;      // of 32 times each for a side of a cell of the sun masks; 0: there are no masks
 };
 
@@ -35,17 +36,20 @@ struct DayVertex {
     vec3 normal;     // shading normal, unit
     vec3 geometric;  // of the triangle, unit, on the side of the normal
     vec3 weight;     // irradiance at the receiver for each W/m² of irradiance at the vertex
-    float sun;       // factor on the light of the sun: 1 / the probability of its shadow rays; 0: it sends none
+    float share;     // the weight, relative to that of the first vertex of the path
     uint side;       // of a cell of the sun masks, if there are any (daylight/masks.glsl)
 };
 
-// The cells of a triangle. The sun masks have a bit for each time for each side of a cell: twice the number of the cell, and 1 for its back. A grid of columns along the longest side and of rows to the corner
-// opposite to it. Twin: techniques::daylight::masks::Cells.
+// The cells of a triangle: a grid of columns along the longest side and of rows to the corner opposite to it. The sun masks have a bit for each time
+// for each side of a cell: twice the number of the cell, and 1 for its back. Twin: techniques::daylight::masks::Cells.
 struct DayCells {
     uint first;   // number of the first cell
     uint size;    // bits 0 to 14: columns; 15 to 29: rows; 30 and 31: the corner at which the longest side begins
     float foot;   // of the height on the longest side, as a share of that side
 };
+
+// Times of a group of invocations that add the light of the sun: those of a word of the masks.
+const uint DAY_TIMES = 32u;
 
 // Invocations of a group that chooses points, and most groups of a row of those that trace their rays.
 const uint DAY_MASK_GROUP = 64u;

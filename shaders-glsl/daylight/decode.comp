@@ -131,6 +131,16 @@ TexelLight lightmap_light(vec2 place) {
         if (weight <= 0.0) continue;
         add(sum, texel_light(uvec2(texel)), weight);
     }
+    if (sum.there < 1e-3) {
+        // All four are buried, as beside a thing that hides the middles of texels. Charts are farther apart than the texels around them.
+        for (int i = 0; i < 16; ++i) {
+            ivec2 step = ivec2(i % 4 - 1, i / 4 - 1);
+            ivec2 texel = ivec2(corner) + step;
+            if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(uvec2(texel), texels))) continue;
+            vec2 off = vec2(step) - f;
+            add(sum, texel_light(uvec2(texel)), 0.1 / (1.0 + dot(off, off)));
+        }
+    }
     return mean(sum);
 }
 

@@ -24,6 +24,8 @@ layout(binding = 12, scalar) writeonly buffer Starts { DayStart starts[]; };
 // Their t is positive for the front of a triangle and negative for its back.
 layout(binding = 8, scalar) readonly buffer Receivers { Hit receivers[]; };
 layout(binding = 14, scalar) writeonly buffer Spots { DaySpot spots[]; };
+// For each receiver: the paths that begin inside of a solid, or under a thing that lies on the surface.
+layout(binding = 20, scalar) buffer Buried { uint buried[]; };
 #endif
 layout(binding = 9, scalar) writeonly buffer Vertices { DayVertex vertices[]; };
 layout(binding = 10, scalar) writeonly buffer Escapes { DayEscape escapes[]; };
@@ -37,10 +39,6 @@ layout(binding = 18, scalar) writeonly buffer Wanted { uint wanted[]; };
 layout(binding = 19, scalar) buffer Requests { DayRequests requests; };
 
 #include "daylight/masks.glsl"
-
-// Russian roulette of shadow rays: vertices that carry less than this share of the light of the first vertex of their path send them with a
-// probability. A vertex costs a ray for each time of the day, and late vertices carry little light.
-const float SHADOW_ROULETTE = 0.5;
 
 // Requests a mask if it is not there.
 void request_mask(uint side) {
@@ -98,6 +96,8 @@ void main() {
             s = day_surface(hit.instance, hit.triangle, hit.barycentrics, direction, diffuse_only, false);
 #ifdef PROBES
             if (surface == 1u) start.distance = s.inside ? -hit.t : hit.t;
+#else
+            if (surface == 1u && (s.inside || hit.t < settings.touching)) atomicAdd(buried[receiver], 1u);
 #endif
             if (s.unlit) break;
             vec3 above = s.position + (s.side - direction) * s.gap;
@@ -134,16 +134,13 @@ void main() {
             weight *= s.albedo;
             float largest = brightest(weight) / SAMPLING_PI;
             if (count == 0u) first_largest = largest;
-            float sun = 1.0;
             uint side = 0u;
             if (settings.mask_words != 0u) {
                 side = 2u * day_cell(hit.instance, hit.triangle, hit.barycentrics) + (s.front ? 0u : 1u);
                 request_mask(side);
-            } else if (largest < SHADOW_ROULETTE * first_largest) {
-                float stay = largest / (SHADOW_ROULETTE * first_largest);
-                sun = unit_float(pcg4d(uvec4(salt, 5u, 6u, 7u)).x) < stay ? 1.0 / stay : 0.0;
             }
-            vertices[path * DAY_VERTICES + count] = DayVertex(above, s.normal, s.side, weight / SAMPLING_PI, sun, side);
+            float share = first_largest > 0.0 ? largest / first_largest : 0.0;
+            vertices[path * DAY_VERTICES + count] = DayVertex(above, s.normal, s.side, weight / SAMPLING_PI, share, side);
             ++count;
             if (count >= settings.bounces) break;
             if (count > settings.roulette && largest < 0.25) {

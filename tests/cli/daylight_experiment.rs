@@ -29,7 +29,8 @@ fn small() -> Table {
             } else {
                 settings.insert("samples".into(), Toml::Integer(64));
             }
-            for values in method.get_mut("matrix").into_iter().flat_map(|m| m.as_table_mut().unwrap().iter_mut()) {
+            let matrix = method.get_mut("matrix").into_iter().flat_map(|m| m.as_table_mut().unwrap().iter_mut());
+            for values in matrix.filter(|(key, _)| key.ends_with(".time")) {
                 *values.1 = Toml::Array(TIMES.map(|time| Toml::String(time.into())).to_vec());
             }
         }
@@ -111,6 +112,26 @@ fn the_shipped_experiment_gives_all_its_tables() {
         }
     }
 
+    // A pot after the bake, with light of probes and of the pixels behind it: each picture in three parts.
+    let added = rows(&report, "added");
+    assert_eq!(added.len(), 2 * TIMES.len() * 3);
+    for from in ["probes", "screen"] {
+        let of = |part: &str| {
+            let mut found = added.clone();
+            found.retain(|row| row["part of the picture"] == part && row["indirect light of the object"] == from);
+            found
+        };
+        assert_eq!(of("the object").len(), TIMES.len());
+        for row in &of("the object") {
+            assert!((10.0..200.0).contains(&number(row, "pixels")), "{row:?}");
+            assert!((0.3..3.0).contains(&number(row, "all light")), "{row:?}");
+        }
+        // Far from the pot the light is as without it.
+        for row in &of("the rest") {
+            assert!((0.85..1.15).contains(&number(row, "all light")), "{row:?}");
+        }
+    }
+
     // More images, less error, more bytes; floats are at least as exact as bytes.
     let sizes = rows(&report, "bytes");
     let of = |side: &str, values: &str| -> Vec<(f64, f64)> {
@@ -165,6 +186,7 @@ fn wrong_days_times_and_settings_are_named() {
         ("technique", "bake.samples", Toml::Integer(1), &["'frames'", "bake.samples: 1"]),
         ("reference", "tracer.bounces", Toml::Integer(-1), &["'day, truth'", "bounces"]),
         ("reference", "samples", Toml::Integer(0), &["'day, truth'", "samples is 0"]),
+        ("reference", "object.builtin", Toml::String("kettle".into()), &["'day, truth'", "kettle"]),
     ] {
         let mut wrong = small();
         wrong[list][0]["settings"].as_table_mut().unwrap().insert(key.into(), value);

@@ -21,6 +21,8 @@ mod daylight_experiment;
 mod daylight_export;
 #[path = "../cli/daylight_export_more.rs"]
 mod daylight_export_more;
+#[path = "../cli/daylight_more.rs"]
+mod daylight_more;
 #[path = "../cli/daylight_pictures.rs"]
 mod daylight_pictures;
 #[path = "../cli/door.rs"]

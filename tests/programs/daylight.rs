@@ -13,12 +13,16 @@ mod daylight_blocks;
 mod daylight_cube;
 #[path = "../daylight_day.rs"]
 mod daylight_day;
+#[path = "../daylight_exact.rs"]
+mod daylight_exact;
 #[path = "../daylight_frames.rs"]
 mod daylight_frames;
 #[path = "../daylight_lamps.rs"]
 mod daylight_lamps;
 #[path = "../daylight_light.rs"]
 mod daylight_light;
+#[path = "../daylight_lightmap.rs"]
+mod daylight_lightmap;
 #[path = "../daylight_masks.rs"]
 mod daylight_masks;
 #[path = "../daylight_probes.rs"]

@@ -380,7 +380,7 @@ impl Plan {
         }
         let projection = Mat4::from_cols_array(&projection);
         let help = |with: &str| {
-            format!("Render with {with}, bake this view, or bake the surfaces for all views (--kind atlas)")
+            format!("Render with {with}, bake this view, or bake the surfaces for all views (--kind lightmap)")
         };
         if view.extent != self.extent {
             let [width, height] = self.extent;

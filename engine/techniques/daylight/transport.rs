@@ -10,8 +10,8 @@ use super::{
     Baking, Group, Kind, Plan,
     adaptive::{SPARSE_PATHS, Sparse},
     beam::SUN_ANGULAR_RADIUS,
-    columns::Measured,
     gathered::Spot,
+    light::{Light, is_buried, summed},
     masks::Masks,
     suns::{sun_items, suns_of},
 };
@@ -35,6 +35,8 @@ use crate::{
     },
 };
 
+/// A path of a texel of a lightmap that ends at a surface within this part of the texel's side begins under a thing that lies on the texel.
+const TOUCHING: f32 = 0.25;
 /// Paths of a texel in one batch at most.
 const BATCH: u32 = 16;
 /// Maximum of loop iterations that choosing one lamp takes: a descent of the light tree.
@@ -71,36 +73,6 @@ pub enum Sources {
     Cube(Box<[View; 6]>),
     /// The texels of each tile of a lightmap ([`super::lightmap::Unwrapped::by_tile`]).
     Lightmap(Vec<Vec<(u32, types::Hit)>>),
-}
-
-/// Light of a tile's texels that are on a surface, W/m².
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Light {
-    /// Irradiance by the sun after at least one scattering, for 1 W/m² of the sun: for each texel three rows (red, green, blue) of all times.
-    pub sun: Vec<f32>,
-    /// The same by the odd samples alone less that by the even samples alone, halved: one standard deviation of its noise, on average.
-    pub noise: Vec<f32>,
-    /// Irradiance for a radiance of 1 W/(sr m²) of each patch of the sky: for each texel three rows of all patches.
-    pub sky: Vec<f32>,
-    /// Noise of `sky`.
-    pub sky_noise: Vec<f32>,
-    /// Irradiance by the lamps of each group, direct and scattered: for each texel three rows of all groups.
-    pub lamps: Vec<f32>,
-    /// Noise of `lamps`.
-    pub lamps_noise: Vec<f32>,
-    /// The surface of each texel.
-    pub spots: Vec<Spot>,
-    /// A bit for each texel of the tile, row after row: whether it is on a surface.
-    pub mask: Vec<u32>,
-}
-
-impl Light {
-    /// The light of the sun, of the sky and of lamps, with its noise. `dimensions`: [`Plan::dimensions`].
-    pub fn measured(&self, dimensions: [usize; 3]) -> [Measured<'_>; 3] {
-        let rows = [(&self.sun, &self.noise), (&self.sky, &self.sky_noise), (&self.lamps, &self.lamps_noise)];
-        let mut dimensions = dimensions.into_iter();
-        rows.map(|(rows, noise)| Measured { dimensions: dimensions.next().unwrap_or(0), rows, noise })
-    }
 }
 
 impl Transport {
@@ -155,16 +127,12 @@ impl Transport {
             }
             Sources::Lightmap(tiles) => {
                 let of_tile = tiles.get(tile as usize).map_or(&[][..], Vec::as_slice);
-                of_tile
-                    .iter()
-                    .map(|(texel, hit)| {
-                        mask[*texel as usize / 32] |= 1 << (texel % 32);
-                        *hit
-                    })
-                    .collect()
+                let (texels, hits): (Vec<u32>, Vec<types::Hit>) = of_tile.iter().copied().unzip();
+                let (light, buried) = self.gather(plan, plan.first_receiver(tile), &hits)?;
+                return Ok(light.without(&buried, &texels, mask));
             }
         };
-        let light = self.gather(plan, plan.first_receiver(tile), &hits)?;
+        let (light, _) = self.gather(plan, plan.first_receiver(tile), &hits)?;
         Ok(Light { mask, ..light })
     }
 
@@ -201,8 +169,19 @@ impl Transport {
         // So few paths send fewer shadow rays than masks need.
         let samples = plan.settings.samples.min(SPARSE_PATHS);
         let settings = Baking { samples, sun_masks: 0.0, ..plan.settings.clone() };
-        let light = self.gather(&Plan { settings, lamps: Vec::new(), ..plan.clone() }, 0, &hits)?;
+        let (light, _) = self.gather(&Plan { settings, lamps: Vec::new(), ..plan.clone() }, 0, &hits)?;
         Ok(Sparse { light: Light { mask, ..light }, extent })
+    }
+
+    /// Bytes of the device's memory for the light of a tile with so many texels on surfaces, besides the scene.
+    pub fn bytes_of_tile(plan: &Plan, texels: u64) -> u64 {
+        let texels = texels.max(1);
+        let vertices = u64::from(consts::DAY_VERTICES);
+        let paths = (MOST_VERTICES / (texels * vertices)).clamp(1, BATCH.into()) * texels;
+        let of_path = vertices * size_of::<types::DayVertex>() as u64 + size_of::<types::DayEscape>() as u64 + 4;
+        // Sums are on the device and in the buffer that the host reads.
+        let sums: u64 = plan.dimensions().iter().map(|count| 2 * 24 * *count as u64).sum();
+        paths * of_path + texels * (sums + size_of::<types::Hit>() as u64 + size_of::<types::DaySpot>() as u64 + 4)
     }
 
     /// Goes on with the times of another plan of the same texels.
@@ -268,11 +247,11 @@ impl Transport {
         done
     }
 
-    /// The light of some surface points; `first`: number of the first in the whole bake.
-    fn gather(&mut self, plan: &Plan, first: u32, hits: &[types::Hit]) -> Result<Light> {
+    /// The light of some surface points, and whether each of them is buried ([`Light::without`]); `first`: number of the first in the whole bake.
+    fn gather(&mut self, plan: &Plan, first: u32, hits: &[types::Hit]) -> Result<(Light, Vec<bool>)> {
         let count = hits.len() as u32;
         if count == 0 {
-            return Ok(Light::default());
+            return Ok((Light::default(), Vec::new()));
         }
         let times = plan.times.len() as u32;
         let mask_words = self.mask_words(plan)?;
@@ -287,6 +266,7 @@ impl Transport {
         )?;
         let escapes = buffer("daylight.escapes", paths * size_of::<types::DayEscape>() as u64)?;
         let counts = buffer("daylight.counts", paths * 4)?;
+        let buried = buffer("daylight.buried", u64::from(count) * 4)?;
         let sun_sums = buffer("daylight.sun", u64::from(count) * u64::from(times) * 24)?;
         let groups = plan.lamps.len() as u32;
         let lamp_sums = buffer("daylight.lamps", u64::from(count) * u64::from(groups) * 24)?;
@@ -303,6 +283,7 @@ impl Transport {
             let vertices = graph.import_buffer(&of_vertices);
             let escapes = graph.import_buffer(&escapes);
             let counts = graph.import_buffer(&counts);
+            let buried = graph.import_buffer(&buried);
             let sun_sums = graph.import_buffer(&sun_sums);
             let sky_sums = graph.import_buffer(&sky_sums);
             let lamp_sums = graph.import_buffer(&lamp_sums);
@@ -311,6 +292,7 @@ impl Transport {
                 graph.fill(sun_sums, 0);
                 graph.fill(sky_sums, 0);
                 graph.fill(lamp_sums, 0);
+                graph.fill(buried, 0);
             }
             let spots = graph.buffer("daylight.spots", u64::from(count) * size_of::<types::DaySpot>() as u64);
             let of_lights = handles.moment.lights.len() as u32;
@@ -328,6 +310,7 @@ impl Transport {
                     wanted: masks.wanted,
                     requests: masks.requests,
                     spots,
+                    buried,
                 },
                 rays,
                 handles
@@ -388,8 +371,8 @@ impl Transport {
                 self.run(&graph)?;
                 continue;
             }
-            let [sun, sky, lamps, spots] =
-                [sun_sums, sky_sums, lamp_sums, spots].map(|buffer| graph.read_buffer(buffer));
+            let [sun, sky, lamps, spots, buried] =
+                [sun_sums, sky_sums, lamp_sums, spots, buried].map(|buffer| graph.read_buffer(buffer));
             let frame = self.run(&graph)?;
             let spot = |spot: types::DaySpot| Spot { position: spot.position, normal: spot.normal };
             let spots = frame.buffer(spots).into_iter().map(spot).collect();
@@ -397,7 +380,13 @@ impl Transport {
             [light.sun, light.noise] = summed(&frame.buffer(sun), [count, times, samples]);
             [light.sky, light.sky_noise] = summed(&frame.buffer(sky), [count, consts::SKY_PATCHES, samples]);
             [light.lamps, light.lamps_noise] = summed(&frame.buffer(lamps), [count, groups, samples]);
-            return Ok(light);
+            let buried = frame
+                .buffer::<u32>(buried)
+                .into_iter()
+                .take(hits.len())
+                .map(|paths| is_buried(paths, samples))
+                .collect();
+            return Ok((light, buried));
         }
     }
 }
@@ -443,6 +432,10 @@ pub(super) fn settings(
     if let Kind::View { .. } | Kind::Cube { .. } = plan.receivers {
         flags |= consts::DAY_NORMAL_MAPS;
     }
+    let touching = match plan.receivers {
+        Kind::Lightmap { .. } => TOUCHING / baking.density,
+        _ => 0.0,
+    };
     if baking.diffuse_only {
         flags |= consts::DAY_DIFFUSE_ONLY;
     }
@@ -460,26 +453,7 @@ pub(super) fn settings(
         lights,
         groups: plan.lamps.len() as u32,
         sun_radius: if baking.disc { SUN_ANGULAR_RADIUS.tan() as f32 } else { 0.0 },
+        touching,
         mask_words,
     }
-}
-
-/// Rows of means and of noise from sums in the order of the device: for each receiver and dimension the sums of even and of odd samples.
-fn summed(sums: &[[f32; 3]], [count, dimensions, samples]: [u32; 3]) -> [Vec<f32>; 2] {
-    let (count, dimensions) = (count as usize, dimensions as usize);
-    let all = 1.0 / f64::from(samples);
-    let (even_count, odd_count) = (samples.div_ceil(2), samples / 2);
-    let mut out = [(); 2].map(|()| Vec::with_capacity(3 * count * dimensions));
-    for texel in 0..count {
-        let first = 2 * texel * dimensions;
-        for channel in 0..3 {
-            for pair in sums[first..first + 2 * dimensions].chunks_exact(2) {
-                let [even, odd] = [pair[0][channel], pair[1][channel]].map(f64::from);
-                let difference = odd / f64::from(odd_count.max(1)) - even / f64::from(even_count.max(1));
-                out[0].push(((even + odd) * all) as f32);
-                out[1].push((0.5 * difference) as f32);
-            }
-        }
-    }
-    out
 }

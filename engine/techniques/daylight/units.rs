@@ -7,8 +7,8 @@ use super::{
     columns::{Columns, Measured},
     gathered::Gathered,
     layer::{Aim, Layer, rounded},
+    light::Light,
     probes::Brick,
-    transport::Light,
 };
 use crate::{
     Error, ErrorKind, Result,
@@ -19,7 +19,7 @@ use crate::{
 /// The name of such jobs.
 pub const KIND: &str = "daylight";
 /// Increased whenever the computation changes.
-const VERSION: u32 = 5;
+const VERSION: u32 = 6;
 /// Largest number that a list in a unit may have.
 const MOST_WORDS: u64 = 1 << 32;
 

@@ -13,6 +13,7 @@ use serde_json::json;
 
 use super::{
     info,
+    memory::Need,
     plan::{DayOptions, KindArg, Planned, plan, thin_out},
 };
 use crate::{
@@ -20,6 +21,7 @@ use crate::{
     config,
     console::{self, Console},
     program,
+    prt::available,
     signals::Interrupt,
     stage::{Stage, StageArgs},
 };
@@ -109,6 +111,14 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
         Sources::View(_) | Sources::Cube(_) => None,
         Sources::Lightmap(tiles) => Some(tiles.iter().map(|tile| tile.len() as u64).collect()),
     };
+    let need = Need::new(&plan, of_tiles.as_deref());
+    let gigabytes = |bytes: u64| bytes as f64 / 1e9;
+    let [least, most] = need.machine.map(gigabytes);
+    console.info(&format!(
+        "memory besides the scene: {:.2} GB of the device, and {least:.2} to {most:.2} GB of the machine, as the light needs",
+        gigabytes(need.device)
+    ));
+    need.expect_free(&plan, available())?;
     let mut transport = Transport::new(&gpu, &stage.scene, &plan, sources)?;
     let adaptive = thin_out(&mut plan, &mut transport)?;
     adaptive.iter().for_each(|(said, _)| console.info(said));

@@ -4,6 +4,7 @@ mod bake;
 mod export;
 mod frames;
 mod info;
+mod memory;
 mod plan;
 mod render;
 

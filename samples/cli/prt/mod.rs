@@ -8,5 +8,7 @@ mod render;
 
 pub use bake::{PrtBakeArgs, bake};
 pub use check::{PrtCheckArgs, check};
+pub(crate) use memory::available;
+
 pub use info::{PrtInfoArgs, info};
 pub use render::{PrtArgs, render};

@@ -19,8 +19,9 @@ use crate::{
     },
     techniques::daylight::{
         Plan, Transport,
+        light::Light,
         suns::sun_items,
-        transport::{LAMP_TURNS, Light, lamp_table, settings},
+        transport::{LAMP_TURNS, lamp_table, settings},
     },
 };
 

@@ -16,22 +16,21 @@ use crate::{
 };
 
 /// Techniques of pictures and their names in tables.
-const DAYS: [(&str, &str); 7] = [
+const DAYS: [(&str, &str); 6] = [
     ("day", "the day of the experiment"),
     ("cube", "the same day, from a cube"),
     ("lightmap", "the same day, from a lightmap"),
     ("diffuse", "the same day, diffuse surfaces on both sides"),
     ("overcast", "the same day, overcast"),
     ("winter", "a winter day"),
-    ("added", "an object added after the bake"),
 ];
 const MEASURES: [Measure; 3] = [Measure::RelMse, Measure::Flip, Measure::Pdiff];
 
 /// A picture and its reference.
-struct Two<'a> {
-    run: &'a Done,
-    truth: &'a Done,
-    time: String,
+pub(super) struct Two<'a> {
+    pub run: &'a Done,
+    pub truth: &'a Done,
+    pub time: String,
 }
 
 /// Time of a picture: the value of a matrix of `…daylight.time`.
@@ -40,7 +39,8 @@ fn time(run: &Done) -> Option<String> {
     run.value(key)
 }
 
-fn pairs<'a>(results: &'a Results, view: (&'a str, &'a str), name: &str) -> Vec<Two<'a>> {
+/// The pictures of a technique at a view, each with its reference.
+pub(super) fn pairs<'a>(results: &'a Results, view: (&'a str, &'a str), name: &str) -> Vec<Two<'a>> {
     let mut pairs = Vec::new();
     for run in results.at(view).filter(|run| run.method == name) {
         let Some(time) = time(run) else { continue };

@@ -3,6 +3,7 @@
 //! Runs of the kind `daylight-frames` give the frames of a day. Techniques of the kind `daylight` are held against the reference of the same name
 //! with `, truth` ([`beside`]).
 
+mod added;
 mod beside;
 mod between;
 mod day;
@@ -35,6 +36,9 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
         page.add(between::interpolation(&days)?);
     }
     page.add(beside::section(results)?);
+    if let Some(section) = added::section(results)? {
+        page.add(section);
+    }
     if !days.is_empty() {
         page.add(sizes::error_and_bytes(&days)?);
     }
@@ -85,7 +89,7 @@ fn times(results: &Results, days: &[Day], runs: &[&Done]) -> Result<Section> {
     let mut section = Section::new("Time");
     section.text(
         "*Bake* is the time of the paths for all times of the day and of the compression. *Reference* is the median time of one picture by the path tracer, \
-         times the number of lit frames beside it; its noise is not that of the bake. `cargo bench --bench daylight_cost` compares both at equal error.",
+         times the number of lit frames beside it; its noise is not that of the bake. `cargo bench -p lucerna-samples --bench daylight_cost` compares both at equal error.",
     );
     let columns = ["scene", "lit frames", "bake (s)", "reference (s)", "times lit frames (s)", "frame (ms)"];
     let mut table = Table::new("times", "Measured times", columns).timed();

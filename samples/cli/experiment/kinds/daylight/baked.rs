@@ -9,12 +9,16 @@ use lucerna::{
     scene::{Pose, Scene},
     technique::{Ready, Shot},
     techniques::daylight::{
-        Baked, Baking, Daylight, Light, PictureSettings, Plan, Sky, Stored, Transport, finish, units,
+        Baked, Baking, Daylight, Light, PictureSettings, Plan, Sky, Stored, Transport, finish, probes::Brick, units,
     },
 };
 use serde_json::Value;
 
-use super::{Job, Rendered, Warm, dark, on_device};
+use super::{
+    Job, Rendered, Warm, dark,
+    object::{self, Object},
+    on_device,
+};
 use crate::{
     config,
     daylight::{DayOptions, KindArg, Planned, for_view},
@@ -28,24 +32,35 @@ const KEPT: usize = 2;
 pub(super) struct Kept {
     key: Value,
     scene: Scene,
-    pose: Pose,
     pub(super) plan: Plan,
     /// The light of all tiles before compression, if they are the pixels of the view.
     lights: Vec<Light>,
     stored: Arc<Stored>,
-    ready: Option<(Ready<Daylight>, Runner)>,
+    ready: Option<Shown>,
     /// Wall-clock time of the paths and the compression.
     pub(super) seconds: f64,
     /// Sizes and errors.
     pub(super) facts: Vec<(String, f64)>,
 }
 
-/// The bake for these settings; `None` if it was interrupted.
+/// What renders pictures of a bake.
+struct Shown {
+    object: Object,
+    /// With the object.
+    scene: Scene,
+    pose: Pose,
+    ready: Ready<Daylight>,
+    runner: Runner,
+}
+
+/// The bake for these settings, with `probes` or without; `None` if it was interrupted.
 pub(super) fn of<'w>(
     warm: &'w mut Warm<'_>,
     job: &Job<'_>,
     (day, kind, baking): (&DayOptions, KindArg, &Baking),
+    probes: bool,
 ) -> Result<Option<&'w mut Kept>> {
+    let baking = &Baking { probes: if probes { baking.probes } else { 0.0 }, ..baking.clone() };
     let key = config::to_value(&(day, kind, baking, place::view_key(job.view)?))?;
     let (gpu, scene) = (warm.gpu, warm.scene);
     let list: &mut Vec<Kept> = warm.keep("daylight bakes", |_, _, _| Ok(Vec::new()))?;
@@ -87,8 +102,10 @@ fn make(
         }
     }
     let tiles = finish::tiles(&plan, &gathered, |_| Ok(()))?;
+    let brick = |index: u32| Brick::compress(&plan, transport.brick(&plan, index)?, &skies);
+    let probes = (0..plan.brick_count()).map(brick).collect::<Result<Vec<_>>>()?;
     let seconds = begun.elapsed().as_secs_f64();
-    let stored = Stored { plan: plan.clone(), tiles, probes: Vec::new(), corners };
+    let stored = Stored { plan: plan.clone(), tiles, probes, corners };
     let summary = stored.summary();
     let facts = [
         ("raw bytes", summary.raw_bytes as f64),
@@ -100,25 +117,35 @@ fn make(
         ("noise", summary.noise),
     ];
     let facts = facts.map(|(name, value)| (name.to_owned(), value)).to_vec();
-    let pose = Pose::rest(&scene);
-    Ok(Some(Kept { key, scene, pose, plan, lights, stored: Arc::new(stored), ready: None, seconds, facts }))
+    Ok(Some(Kept { key, scene, plan, lights, stored: Arc::new(stored), ready: None, seconds, facts }))
 }
 
 impl Kept {
-    /// A picture from the compressed light.
-    pub(super) fn render(&mut self, gpu: &Gpu, job: &Job<'_>, settings: &PictureSettings) -> Result<Option<Rendered>> {
-        let Self { scene, pose, stored, ready, .. } = self;
-        let (ready, runner) = match ready {
-            Some(ready) => ready,
-            None => {
-                let baked = Baked { stored: stored.clone(), frames: None, stream: None, file: None, digest: None };
-                let made = Ready::new(gpu, scene, settings, Some(&baked), &mut |_, _| true)?;
-                ready.insert((made, Runner::new(gpu)))
-            }
-        };
-        on_device(runner, job, "daylight", |graph| {
+    /// A picture from the compressed light, with an object that the bake does not know. A layer says where the object is seen.
+    pub(super) fn render(
+        &mut self,
+        gpu: &Gpu,
+        job: &Job<'_>,
+        settings: &PictureSettings,
+        object: &Object,
+    ) -> Result<Option<Rendered>> {
+        if self.ready.as_ref().is_none_or(|shown| shown.object != *object) {
+            let scene = dark(&object.added_to(&self.scene, job.view)?);
+            let baked = Baked { stored: self.stored.clone(), frames: None, stream: None, file: None, digest: None };
+            let ready = Ready::new(gpu, &scene, settings, Some(&baked), &mut |_, _| true)?;
+            let pose = Pose::rest(&scene);
+            self.ready = Some(Shown { object: object.clone(), scene, pose, ready, runner: Runner::new(gpu) });
+        }
+        let Some(Shown { scene, pose, ready, runner, .. }) = &mut self.ready else { return Ok(None) };
+        let rendered = on_device(runner, job, "daylight", |graph| {
             ready.frame(graph, (scene, pose), job.view, Shot::default(), settings)
-        })
+        })?;
+        Ok(rendered.map(|mut rendered| {
+            if object.is_some() {
+                rendered.layers.layers.push(object::layer(scene, job.view));
+            }
+            rendered
+        }))
     }
 
     /// Irradiance before compression, W/m² for 1 W/m² of the sun: one picture for each lit time, 0 without a surface.

@@ -4,6 +4,7 @@
 
 mod baked;
 mod filter;
+mod object;
 mod truth;
 
 use glam::{Quat, Vec2, Vec3};
@@ -12,12 +13,13 @@ use lucerna::{
     image::{Layer, Layers, Precision},
     scene::{Environment, Light, LightKind, Node, Pose, Scene, Transform, environment::direction_from_uv},
     technique::Settings as _,
-    techniques::daylight::{Baking, PictureSettings, Settings, Sky},
+    techniques::daylight::{Added, Baking, PictureSettings, Settings, Sky},
     tracer,
 };
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
+use self::object::Object;
 use super::{Job, MOST_SAMPLES, Rendered, Times, Warm, on_device, read};
 use crate::{
     config,
@@ -37,6 +39,8 @@ struct OfPicture {
     kind: KindArg,
     bake: Baking,
     picture: PictureSettings,
+    /// Stands in the scene after the bake.
+    object: Object,
 }
 
 impl Default for OfPicture {
@@ -46,6 +50,7 @@ impl Default for OfPicture {
             kind: KindArg::View,
             bake: Baking::default(),
             picture: PictureSettings::default(),
+            object: Object::default(),
         }
     }
 }
@@ -72,12 +77,14 @@ struct OfTruth {
     /// Paths a pixel.
     samples: u32,
     tracer: tracer::Settings,
+    object: Object,
 }
 
 impl Default for OfTruth {
     fn default() -> Self {
         let tracer = tracer::Settings { filter: tracer::Filter::Centre, ..tracer::Settings::default() };
-        Self { day: DayOptions::default(), daylight: Settings::default(), samples: 64, tracer }
+        let (day, daylight, object) = (DayOptions::default(), Settings::default(), Object::default());
+        Self { day, daylight, samples: 64, tracer, object }
     }
 }
 
@@ -86,6 +93,7 @@ pub(super) fn picture_settings(paper: bool, changes: &Changes) -> Result<Value> 
     let settings: OfPicture = config::with(&OfPicture::default(), changes)?;
     settings.bake.validate()?;
     settings.picture.validate()?;
+    settings.object.validate()?;
     settings.day.day()?.parse_time(&settings.picture.daylight.time).map_err(Error::usage)?;
     config::to_value(&settings)
 }
@@ -105,6 +113,7 @@ pub(super) fn truth_settings(paper: bool, changes: &Changes) -> Result<Value> {
     super::no_paper("daylight-truth", paper)?;
     let settings: OfTruth = config::with(&OfTruth::default(), changes)?;
     settings.tracer.validate()?;
+    settings.object.validate()?;
     PictureSettings { daylight: settings.daylight.clone(), ..PictureSettings::default() }.validate()?;
     settings.day.day()?.parse_time(&settings.daylight.time).map_err(Error::usage)?;
     match settings.samples {
@@ -115,10 +124,11 @@ pub(super) fn truth_settings(paper: bool, changes: &Changes) -> Result<Value> {
 
 /// A picture by baked daylight. The bake stays in memory for the other times of its day.
 pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
-    let OfPicture { day, kind, bake, picture } = read(job.settings)?;
+    let OfPicture { day, kind, bake, picture, object } = read(job.settings)?;
     let gpu = warm.gpu.clone();
-    let Some(bake) = baked::of(warm, job, (&day, kind, &bake))? else { return Ok(None) };
-    let rendered = bake.render(&gpu, job, &picture)?;
+    let probes = object.is_some() && picture.daylight.added == Added::Probes;
+    let Some(bake) = baked::of(warm, job, (&day, kind, &bake), probes)? else { return Ok(None) };
+    let rendered = bake.render(&gpu, job, &picture, &object)?;
     Ok(rendered.map(|mut rendered| {
         rendered.times.facts.extend(bake.facts.iter().cloned());
         rendered.times.facts.push(("seconds whole".into(), bake.seconds));
@@ -131,8 +141,8 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rende
 pub(super) fn frames(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
     let OfFrames { day, bake, filter } = read(job.settings)?;
     let gpu = warm.gpu.clone();
-    let Some(bake) = baked::of(warm, job, (&day, KindArg::View, &bake))? else { return Ok(None) };
-    let Some(shown) = bake.render(&gpu, job, &PictureSettings::default())? else { return Ok(None) };
+    let Some(bake) = baked::of(warm, job, (&day, KindArg::View, &bake), false)? else { return Ok(None) };
+    let Some(shown) = bake.render(&gpu, job, &PictureSettings::default(), &Object::default())? else { return Ok(None) };
     let of = |name: &str| shown.layers.layer(name).map(|layer| layer.data.as_slice()).unwrap_or_default();
     let (mut frames, mut noise) = (bake.frames(), bake.noise());
     if filter > 0 {

@@ -16,13 +16,13 @@ const OF_DIRECT: u32 = 4;
 /// Layers as those of baked daylight: `direct` is the light that surfaces have from the sun directly, and the sky behind the scene; `indirect` is
 /// all other light.
 pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>, settings: OfTruth) -> Result<Option<Rendered>> {
-    let OfTruth { day, daylight, samples, mut tracer } = settings;
+    let OfTruth { day, daylight, samples, mut tracer, object } = settings;
     tracer.seed = tracer.seed.wrapping_add(job.seed);
     let civil = day.day()?;
     let seconds = civil.parse_time(&daylight.time).map_err(Error::usage)?;
     let sun = Vec3::from(civil.sun(seconds).direction(day.north));
     let sky = Sky::new(daylight.weather()?, sun.as_dvec3().to_array()).map_err(Error::usage)?;
-    let (scene, pose) = lit(dark(warm.scene), sun, &sky, daylight.strength);
+    let (scene, pose) = lit(dark(&object.added_to(warm.scene, job.view)?), sun, &sky, daylight.strength);
     let mut running = Tracer::new(warm.gpu, &scene, &pose)?;
     running.start(job.view, &tracer)?;
     let progress = running.run(samples.into(), |_| !job.interrupt.requested())?;

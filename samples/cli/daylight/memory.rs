@@ -1,0 +1,108 @@
+//! The memory that a bake needs.
+
+use lucerna::{
+    Error, Result,
+    techniques::daylight::{Kind, Plan, Transport},
+};
+
+/// Bytes that a bake needs besides the scene.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Need {
+    /// Of the device, for the tile with the most texels.
+    pub device: u64,
+    /// Of the machine, at least and at most, when the light of all tiles is filtered and compressed. It depends on the number of vectors that
+    /// describe the light.
+    pub machine: [u64; 2],
+}
+
+/// Vectors of a kind of light at least, for an estimate, and at most.
+const VECTORS: [u64; 2] = [4, 128];
+/// Bytes of a texel besides its coefficients: its surface, and what the filter compares.
+const OF_TEXEL: u64 = 24 + 64;
+/// Bytes of a vector's coefficients at a texel: three colours, mean and noise, 16 bits.
+const OF_VECTOR: u64 = 12;
+
+impl Need {
+    /// `of_tiles`: texels of each tile of a lightmap; `None`: all texels of the plan's tiles are on surfaces.
+    pub fn new(plan: &Plan, of_tiles: Option<&[u64]>) -> Self {
+        let of_tile = |tile: u32| {
+            let [_, _, columns, rows] = plan.tile(tile);
+            u64::from(columns) * u64::from(rows)
+        };
+        let tiles: Vec<u64> = match of_tiles {
+            Some(tiles) => tiles.to_vec(),
+            None => (0..plan.tile_count()).map(of_tile).collect(),
+        };
+        let (most, all) = (tiles.iter().copied().max().unwrap_or(0), tiles.iter().sum::<u64>());
+        let dimensions = plan.dimensions();
+        let device = Transport::bytes_of_tile(plan, most);
+        let machine = VECTORS.map(|vectors| {
+            let coefficients: u64 = dimensions.iter().map(|count| vectors.min(*count as u64)).sum();
+            // A tile is traced and coded meanwhile: means and noise of all times, as numbers of 32 and of 64 bits.
+            let of_one: u64 = dimensions.iter().map(|count| most * 3 * 2 * 12 * *count as u64).sum();
+            all * (OF_TEXEL + OF_VECTOR * coefficients) + of_one
+        });
+        Self { device, machine }
+    }
+
+    /// Refuses a bake that needs more than `free` bytes of the machine at least; `None`: unknown.
+    ///
+    /// # Errors
+    /// `Usage` with both numbers, and what makes the bake smaller.
+    pub fn expect_free(&self, plan: &Plan, free: Option<u64>) -> Result<()> {
+        let [least, _] = self.machine;
+        let Some(free) = free.filter(|free| *free < least) else { return Ok(()) };
+        let (key, help) = match plan.receivers {
+            Kind::Lightmap { .. } => ("bake.density", "Choose fewer texels along a metre, or a larger bake.interval"),
+            Kind::Cube { .. } => ("bake.face", "Choose smaller faces, or a larger bake.interval"),
+            Kind::View { .. } => ("--size", "Choose a smaller picture, or a larger bake.interval"),
+        };
+        let what = format!("the bake needs at least {least} bytes of memory, {free} are free");
+        Err(Error::usage(what).at(key).help(help))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use lucerna::{
+        scene::{Pose, View},
+        techniques::daylight::Baking,
+    };
+
+    use super::*;
+    use crate::daylight::{DayOptions, KindArg, for_view};
+
+    fn plan(size: u32) -> Plan {
+        let scene = lucerna_scenes::load("cornell").unwrap();
+        let view = View::of_camera(&scene, &Pose::rest(&scene), 0, [size, size]).unwrap();
+        for_view(&DayOptions::default(), KindArg::View, &Baking::default(), &scene, "0", &view).unwrap().plan
+    }
+
+    #[test]
+    fn the_machine_needs_more_for_more_texels_and_the_device_needs_one_tile() {
+        let [small, large] = [64, 256].map(|size| Need::new(&plan(size), None));
+        assert_eq!(small.device, large.device);
+        // A tile of 32×32 texels: vertices of its paths, and sums of even and odd samples of all times.
+        let times = plan(64).times.len() as u64;
+        assert!(small.device > 1024 * 48 * times && small.device < 1 << 30, "{}", small.device);
+        assert!(small.machine[0] < small.machine[1] && large.machine[0] > small.machine[0]);
+        assert!(large.machine[0] > 256 * 256 * (OF_TEXEL + OF_VECTOR * 8));
+        // Tiles of a lightmap may have few texels on surfaces.
+        assert!(Need::new(&plan(64), Some(&[3, 5])).device < small.device);
+    }
+
+    #[test]
+    fn more_than_the_free_memory_is_refused_with_both_numbers() {
+        let plan = plan(256);
+        let need = Need::new(&plan, None);
+        let [least, _] = need.machine;
+        need.expect_free(&plan, Some(least)).unwrap();
+        need.expect_free(&plan, None).unwrap();
+        let error = need.expect_free(&plan, Some(least - 1)).unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        let text = error.to_string();
+        for part in [&format!("{least} bytes"), &format!("{} are free", least - 1), "smaller picture", "--size"] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! Lightmaps of whole bakes as pictures show them: closed forms, seams, things that stand in a floor, and the path tracer from other cameras.
+
+use crate::{
+    daylight_lab::{Studio, baked, lights},
+    daylight_light::{eye, plan},
+    tracer_lab::{Stage, flat_view, matt, render, view},
+};
+use glam::{Mat4, Quat, Vec3, vec3};
+use lucerna::{
+    gpu::{Gpu, testing::with_gpu},
+    scene::{Material, Scene, Transform, View},
+    techniques::daylight::{
+        Baked, Baking, Group, Kind, PictureSettings, Plan, Sources, Stored, digest, finish,
+        gathered::Spot,
+        lightmap::{self, Unwrapped},
+        units,
+    },
+};
+
+fn baking(samples: u32) -> Baking {
+    Baking { samples, bounces: 16, roulette: 16, disc: false, diffuse_only: true, ..Baking::default() }
+}
+
+/// The plan of a lightmap with one group of lamps: what glows.
+fn planned(scene: &Scene, glowing: u32, settings: Baking) -> (Plan, Unwrapped) {
+    let unwrapped = lightmap::unwrap(scene, &settings).unwrap();
+    let covered = unwrapped.receivers.len() as u64;
+    let lamps = vec![Group { name: "lamps".into(), lights: Vec::new(), materials: vec![glowing] }];
+    let corners = digest(&unwrapped.lightmap.corners);
+    let plan = Plan {
+        receivers: Kind::Lightmap { charts: unwrapped.charts, covered, corners },
+        extent: unwrapped.lightmap.extent,
+        lamps,
+        ..plan(scene, &eye(), settings)
+    };
+    (plan, unwrapped)
+}
+
+fn lightmap_of(gpu: &Gpu, scene: &Scene, glowing: u32, settings: Baking) -> Baked {
+    let (plan, unwrapped) = planned(scene, glowing, settings);
+    let sources = Sources::Lightmap(unwrapped.by_tile(plan.side()));
+    let stored = baked(gpu, scene, plan, sources);
+    Baked::new(Stored { corners: unwrapped.lightmap.corners, ..stored })
+}
+
+/// A lightmap whose lamps have the irradiance `of` a position and a normal.
+fn lightmap_with(gpu: &Gpu, scene: &Scene, glowing: u32, of: impl Fn(Vec3, Vec3) -> f32) -> Baked {
+    let (plan, unwrapped) = planned(scene, glowing, Baking { bounces: 1, tolerance: 0.002, ..baking(2) });
+    let sources = Sources::Lightmap(unwrapped.by_tile(plan.side()));
+    let skies = units::skies(&plan).unwrap();
+    let mut tiles = lights(gpu, scene, &plan, sources);
+    for light in &mut tiles {
+        let value = |spot: &Spot| of(spot.position.into(), spot.normal.into());
+        light.lamps = light.spots.iter().flat_map(|spot| [value(spot); 3]).collect();
+        light.lamps_noise = vec![0.0; light.lamps.len()];
+    }
+    let gathered: Vec<_> = tiles.iter().map(|light| units::gathered(&plan, light, &skies).unwrap()).collect();
+    let tiles = finish::tiles(&plan, &gathered, |_| Ok(())).unwrap();
+    Baked::new(Stored { plan, tiles, probes: Vec::new(), corners: unwrapped.lightmap.corners })
+}
+
+fn lamps_alone() -> PictureSettings {
+    let mut settings = PictureSettings::default();
+    settings.daylight.time = "00:00".into();
+    settings.daylight.lamps = "on".into();
+    settings
+}
+
+/// The pixels with an albedo of 0.5: their normals, and their irradiance by the lamps alone.
+fn seen(gpu: &Gpu, scene: &Scene, view: View, baked: &Baked) -> Vec<(Vec3, f32)> {
+    let mut studio = Studio::with(gpu, scene.clone(), view, baked, &lamps_alone());
+    let layers = studio.frame(0, &lamps_alone()).unwrap().0;
+    let of = |name: &str| layers.layer(name).unwrap().rgb_pixels().unwrap();
+    let (irradiance, albedo, normals) = (of("irradiance"), of("albedo"), of("normal"));
+    let grey = (0..albedo.len()).filter(|pixel| (albedo[*pixel][1] - 0.5).abs() < 0.02);
+    grey.map(|pixel| (Vec3::from(normals[pixel]), irradiance[pixel][1])).collect()
+}
+
+/// A room of `size` metres that glows with a radiance of 1 around bodies whose albedo is 0.5.
+fn glowing_room(size: f32, bodies: impl FnOnce(&mut Stage, u32)) -> (Scene, u32) {
+    let mut stage = Stage::new();
+    let lamp = stage.emitter(Vec3::ONE);
+    stage.cuboid(lamp, Vec3::splat(-0.5 * size), Vec3::splat(0.5 * size), true);
+    let grey = stage.material(Material::diffuse("grey", Vec3::splat(0.5)));
+    bodies(&mut stage, grey);
+    (stage.scene, lamp)
+}
+
+fn sphere() -> (Scene, u32) {
+    glowing_room(4.0, |stage, grey| stage.sphere(grey, Vec3::ZERO, 0.8, 24, false))
+}
+
+fn cube_turn() -> Quat {
+    Quat::from_euler(glam::EulerRot::XYZ, 0.5, 0.7, 0.3)
+}
+
+fn cube() -> (Scene, u32) {
+    glowing_room(4.0, |stage, grey| {
+        stage.cuboid(grey, Vec3::splat(-0.6), Vec3::splat(0.6), false);
+        turn(stage, 6, cube_turn());
+    })
+}
+
+fn cameras() -> [View; 3] {
+    [vec3(0.3, 0.4, 1.9), vec3(-1.8, 1.2, -1.0), vec3(0.5, -1.9, 0.8)]
+        .map(|from| view(from, Vec3::ZERO, 60.0, [96, 96]))
+}
+
+/// The least and the largest of some numbers.
+fn range(of: impl Iterator<Item = f32>) -> [f32; 2] {
+    of.fold([f32::MAX, f32::MIN], |[least, most], value| [least.min(value), most.max(value)])
+}
+
+/// Turns the last `count` meshes of a scene.
+fn turn(stage: &mut Stage, count: usize, by: Quat) {
+    let all = stage.scene.nodes.len();
+    for node in &mut stage.scene.nodes[all - count..] {
+        node.local = Transform::Matrix(Mat4::from_quat(by));
+    }
+}
+
+#[test]
+fn every_pixel_finds_the_texels_of_its_own_surface() {
+    with_gpu(|gpu| {
+        // Each face of the cube has a number.
+        let (scene, lamp) = cube();
+        let face = |normal: Vec3| {
+            let n = cube_turn().inverse() * normal;
+            [n.x, -n.x, n.y, -n.y, n.z, -n.z].iter().position(|along| *along > 0.9).map(|face| 1.0 + face as f32)
+        };
+        let baked = lightmap_with(gpu, &scene, lamp, |_, normal| face(normal).unwrap_or(20.0));
+        let mut faces = [0; 7];
+        let mut wrong = 0;
+        for camera in cameras() {
+            for (normal, found) in seen(gpu, &scene, camera, &baked) {
+                let wanted = face(normal).unwrap();
+                wrong += usize::from((found / wanted - 1.0).abs() > 0.01);
+                faces[wanted as usize] += 1;
+            }
+        }
+        // A pixel on an edge of the cube may see either face.
+        println!("cube: {wrong} of {} pixels have the light of another face", faces.iter().sum::<usize>());
+        assert!(wrong <= 6, "{wrong}");
+        assert!(faces[1..].iter().filter(|pixels| **pixels > 300).count() >= 5, "{faces:?}");
+        // Light that changes by up to 39 % along a metre. A chart ends within a texel of 0.125 m, and beyond its last texel the light stays the
+        // same, so up to half of a texel's change may be missing at a seam.
+        let (scene, lamp) = sphere();
+        let field = |p: Vec3| 2.0 + p.dot(vec3(0.6, -0.4, 0.3));
+        let baked = lightmap_with(gpu, &scene, lamp, |position, _| field(position));
+        for camera in cameras() {
+            let pixels = seen(gpu, &scene, camera, &baked);
+            let [least, most] = range(pixels.iter().map(|(normal, found)| found / field(0.8 * *normal)));
+            println!("sphere: {} pixels, {least:.4} to {most:.4}", pixels.len());
+            assert!(pixels.len() > 2000 && least > 0.975 && most < 1.025, "{least} to {most}");
+        }
+    });
+}
+
+#[test]
+fn convex_bodies_under_even_light_have_an_irradiance_of_pi() {
+    with_gpu(|gpu| {
+        for (name, (scene, lamp)) in [("sphere", sphere()), ("cube", cube())] {
+            let baked =
+                lightmap_of(gpu, &scene, lamp, Baking { bounces: 1, density: 6.0, tolerance: 0.004, ..baking(1024) });
+            for camera in cameras() {
+                let mut ratios: Vec<f32> =
+                    seen(gpu, &scene, camera, &baked).iter().map(|(_, e)| e / std::f32::consts::PI).collect();
+                ratios.sort_by(f32::total_cmp);
+                let count = ratios.len();
+                let mean = ratios.iter().sum::<f32>() / count as f32;
+                let [low, high] = [ratios[count / 100], ratios[count - 1 - count / 100]];
+                println!(
+                    "{name}: {count} pixels, mean {mean:.4}, 98 of 100 from {low:.4} to {high:.4}; {:.4} to {:.4}",
+                    ratios[0],
+                    ratios[count - 1]
+                );
+                assert!(count > 2000 && (mean - 1.0).abs() < 0.02, "{name}: {mean}");
+                assert!(low > 0.94 && high < 1.06, "{name}: {low} to {high}");
+            }
+        }
+    });
+}
+
+#[test]
+fn a_closed_box_that_glows_has_its_emission_over_one_less_its_albedo_from_any_camera() {
+    with_gpu(|gpu| {
+        let (albedo, emission) = (0.5, 0.4);
+        let mut stage = Stage::new();
+        let material = Material { emissive: Vec3::splat(emission), ..Material::diffuse("", Vec3::splat(albedo)) };
+        let glowing = stage.material(material);
+        stage.cuboid(glowing, Vec3::splat(-1.0), Vec3::ONE, true);
+        let baked = lightmap_of(gpu, &stage.scene, glowing, baking(512));
+        let wanted = std::f32::consts::PI * emission / (1.0 - albedo);
+        for [from, to] in [[vec3(0.1, -0.2, 0.8), Vec3::NEG_Z], [vec3(-0.9, 0.9, -0.9), vec3(1.0, -1.0, 0.8)]] {
+            let pixels = seen(gpu, &stage.scene, view(from, to, 70.0, [48, 48]), &baked);
+            let ratios: Vec<f32> = pixels.iter().map(|(_, e)| e / wanted).collect();
+            let mean = ratios.iter().sum::<f32>() / ratios.len() as f32;
+            let [least, most] = range(ratios.iter().copied());
+            println!("from {from}: mean {mean:.4}, {least:.4} to {most:.4}");
+            assert!((mean - 1.0).abs() < 0.01, "from {from}: {mean}");
+            // Single texels have the noise of their paths.
+            assert!(least > 0.8 && most < 1.2, "from {from}: {least} to {most}");
+        }
+    });
+}
+
+/// The least irradiance of a floor beside a black block that stands in it, or on it, seen from above; by that of an open floor.
+fn beside_a_block(gpu: &Gpu, foot: f32) -> f32 {
+    let (scene, lamp) = glowing_room(4.2, |stage, grey| {
+        let black = stage.material(Material::diffuse("black", Vec3::ZERO));
+        stage.quad(grey, vec3(-1.2, 0.0, -1.2), Vec3::Z * 2.4, Vec3::X * 2.4);
+        stage.cuboid(black, vec3(-0.53, foot, -0.53), vec3(0.53, 0.6, 0.53), false);
+    });
+    let baked = lightmap_of(gpu, &scene, lamp, Baking { bounces: 4, ..baking(512) });
+    let pixels = seen(gpu, &scene, flat_view(vec3(0.0, 2.0, 0.0), Vec3::ZERO, 2.0, [160, 160]), &baked);
+    // The block takes 28 % of the picture.
+    assert!(pixels.len() > 18_000, "{}", pixels.len());
+    range(pixels.iter().map(|(_, e)| *e))[0] / std::f32::consts::PI
+}
+
+#[test]
+fn a_thing_that_stands_in_a_floor_has_no_black_seam() {
+    with_gpu(|gpu| {
+        for foot in [-0.5, 1e-4] {
+            // A floor beside a wall without an end would have half of the light, with the noise of its paths.
+            let least = beside_a_block(gpu, foot);
+            println!("foot at {foot} m: {least:.3} of the open floor's light");
+            assert!(least > 0.45, "foot at {foot} m: {least}");
+        }
+    });
+}
+
+#[test]
+fn a_lightmap_has_the_light_of_the_path_tracer_from_cameras_that_it_was_not_made_for() {
+    with_gpu(|gpu| {
+        let mut stage = Stage { scene: crate::daylight_light::stage() };
+        let lamp = stage.emitter(vec3(5.0, 5.0, 5.0));
+        stage.quad(lamp, vec3(-1.5, 1.9, -1.0), Vec3::X * 0.8, Vec3::Z * 0.8);
+        let baked = lightmap_of(gpu, &stage.scene, lamp, Baking { density: 16.0, ..baking(128) });
+        for from in [vec3(0.0, 2.2, 4.5), vec3(1.8, 1.7, 1.8), vec3(-1.2, 0.4, 1.9)] {
+            let eye = view(from, vec3(0.0, 0.6, 0.0), 45.0, [48, 36]);
+            let mut studio = Studio::with(gpu, stage.scene.clone(), eye, &baked, &lamps_alone());
+            let found = studio.frame(0, &lamps_alone()).unwrap().0;
+            let truth = render(gpu, &stage.scene, &eye, &matt(16), 256);
+            let of = |layers: &lucerna::image::Layers, name: &str| layers.layer(name).unwrap().data.clone();
+            let [a, b, c] = [of(&found, "indirect"), of(&truth, "direct"), of(&truth, "indirect")];
+            let [found, wanted] = (0..a.len())
+                .fold([0.0f64; 2], |[found, wanted], i| [found + f64::from(a[i]), wanted + f64::from(b[i] + c[i])]);
+            println!("from {from}: {:.4} of the path tracer's energy", found / wanted);
+            assert!((found / wanted - 1.0).abs() < 0.02, "from {from}: {}", found / wanted);
+        }
+    });
+}
