@@ -92,10 +92,12 @@ fn shared_paths_and_paths_of_each_time_agree_in_every_texel() {
                 (count, square, sum) = (count + 1.0, square + z * z, sum + z);
                 far += if z.abs() > 5.0 { 1.0 } else { 0.0 };
             }
-            // Fourteen degrees of freedom: a variance of 14 / 12.
+            // Seven to fourteen degrees of freedom: a variance of 14 / 12 to 7 / 5.
             let (spread, drift) = ((square / count).sqrt(), sum / count.sqrt());
-            println!("time {time}: {count} pixels, z of {spread:.3} (1.080), mean {drift:.2}, beyond 5: {far}");
-            assert!(count > 500.0 && (0.98..1.18).contains(&spread), "time {time}: {spread}");
+            println!(
+                "time {time}: {count} pixels, z of {spread:.3} (1.080 to 1.183), mean {drift:.2}, beyond 5: {far}"
+            );
+            assert!(count > 500.0 && (0.98..1.25).contains(&spread), "time {time}: {spread}");
             assert!(drift.abs() < 4.5, "time {time}: {drift}");
             assert!(far <= 3.0, "time {time}: {far} pixels");
         }

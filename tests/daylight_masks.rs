@@ -1,4 +1,4 @@
-//! Sun masks against exact shadow rays, and shadow rays that only a part of the vertices sends.
+//! Sun masks against exact shadow rays.
 
 use crate::{
     daylight_lab::lights,

@@ -1,7 +1,8 @@
 //! What the indirect light of a day costs: one table with four ways to the same error. *One by one*: the path tracer
 //! renders each lit frame. *Adaptive*: it renders the frames that the paper's test needs. *Shared*: one set of paths
 //! serves all times, with an exact shadow ray for each vertex and time (`daylight bake`), or with sun masks at points
-//! [`MASKS`] metres apart (`bake.sun_masks`), whose points are part of the time.
+//! [`MASKS`] metres apart (`bake.sun_masks`), whose points are part of the time. Then the bytes of the day and the time of a picture
+//! from the bake.
 //!
 //! `cargo bench -p lucerna-samples --bench daylight_cost [-- WIDTHxHEIGHT [SAMPLES [SCENE]]]`; 48x36, 64 and hall by
 //! default; SAMPLES: paths of a pixel of the shared way; SCENE: a built-in scene, seen by its first camera.
@@ -24,9 +25,11 @@ use glam::{Quat, Vec3};
 use lucerna::{
     Error, ErrorKind, Result,
     gpu::{Gpu, GpuOptions},
+    graph::{Graph, Runner},
     measure::{Display, Exposure, Measure, Options, Pair, Picture},
     scene::{Light, LightKind, Node, Pose, Scene, Transform, View},
-    techniques::daylight::{Baking, Plan, Sky, Transport, units},
+    technique::{Ready, Shot},
+    techniques::daylight::{Baked, Baking, Daylight, PictureSettings, Plan, Sky, Stored, Transport, units},
     tracer::{self, Filter, Tracer},
 };
 use lucerna_samples::daylight::{DayOptions, KindArg, for_view};
@@ -34,6 +37,8 @@ use lucerna_scenes as builtin;
 
 /// Times of the day at which the path tracer is measured.
 const MEASURED: usize = 12;
+/// Pictures whose time is measured.
+const PICTURES: usize = 9;
 /// Most paths a pixel of the path tracer.
 const MOST: u32 = 1 << 14;
 /// The goal: the shared way costs at most this share of rendering frames one by one.
@@ -109,8 +114,11 @@ fn dark(scene: &Scene) -> Scene {
     scene
 }
 
-/// Radiance of all times, by time; and what the paths and the compression took.
-fn shared(gpu: &Gpu, scene: &Scene, view: &View, plan: &Plan, albedo: &[f32]) -> Result<(Vec<Vec<f32>>, [Spent; 2])> {
+/// Radiance of all times, by time.
+type Frames = Vec<Vec<f32>>;
+
+/// The frames, what the paths and the compression took, and the bake.
+fn shared(gpu: &Gpu, scene: &Scene, view: &View, plan: &Plan, albedo: &[f32]) -> Result<(Frames, [Spent; 2], Stored)> {
     let sources = lucerna::techniques::daylight::Sources::View(Box::new(*view));
     let mut transport = Transport::new(gpu, scene, plan, sources)?;
     let (width, height) = (plan.extent[0] as usize, plan.extent[1] as usize);
@@ -122,9 +130,11 @@ fn shared(gpu: &Gpu, scene: &Scene, view: &View, plan: &Plan, albedo: &[f32]) ->
         to.processor = Some(to.processor.unwrap_or(0.0)).zip(more.processor).map(|(a, b)| a + b);
     };
     let [columns, rows] = plan.tiles();
+    let mut tiles = Vec::new();
     for tile in 0..columns * rows {
         let (light, paths) = Spent::of(|| transport.tile(plan, tile))?;
-        let (_, compression) = Spent::of(|| units::compress(plan, &light, &skies))?;
+        let (compressed, compression) = Spent::of(|| units::compress(plan, &light, &skies))?;
+        tiles.push(compressed);
         add(&mut spent[0], paths);
         add(&mut spent[1], compression);
         for (number, [x, y]) in plan.covered(tile, &light.mask).enumerate() {
@@ -136,7 +146,26 @@ fn shared(gpu: &Gpu, scene: &Scene, view: &View, plan: &Plan, albedo: &[f32]) ->
             }
         }
     }
-    Ok((frames, spent))
+    let stored = Stored { plan: plan.clone(), tiles, probes: Vec::new(), corners: Vec::new() };
+    Ok((frames, spent, stored))
+}
+
+/// Median wall-clock time of a picture of the bake at noon, milliseconds.
+fn picture_ms(gpu: &Gpu, scene: &Scene, view: &View, stored: Stored) -> Result<f64> {
+    let settings = PictureSettings::default();
+    let mut ready = Ready::<Daylight>::new(gpu, scene, &settings, Some(&Baked::new(stored)), &mut |_, _| true)?;
+    let (pose, mut runner, mut all) = (Pose::rest(scene), Runner::new(gpu), Vec::new());
+    for _ in 0..=PICTURES {
+        let begun = Instant::now();
+        let mut graph = Graph::new("daylight");
+        ready.frame(&mut graph, (scene, &pose), view, Shot::default(), &settings)?;
+        runner.run(&graph)?;
+        all.push(begun.elapsed().as_secs_f64() * 1e3);
+    }
+    // The first one creates pipelines.
+    all.remove(0);
+    all.sort_by(f64::total_cmp);
+    Ok(all[all.len() / 2])
 }
 
 /// The path tracer's noise relative to the mean, and the seconds of one picture, for 1, 2, 4… paths a pixel.
@@ -312,14 +341,14 @@ fn run() -> Result<()> {
     };
     // The first bake creates pipelines.
     shared(&gpu, &scene, &view, &Plan { settings: Baking { samples: 2, ..baking(0) }, ..first.clone() }, &albedo)?;
-    let (a, spent) = shared(&gpu, &scene, &view, &first, &albedo)?;
-    let (b, _) = shared(&gpu, &scene, &view, &second, &albedo)?;
+    let (a, spent, stored) = shared(&gpu, &scene, &view, &first, &albedo)?;
+    let (b, ..) = shared(&gpu, &scene, &view, &second, &albedo)?;
     let lit = first.times.len();
     let masked = |plan: &Plan| Plan { settings: Baking { sun_masks: MASKS, ..plan.settings.clone() }, ..plan.clone() };
     let few = |plan: &Plan| Plan { settings: Baking { samples: 2, ..plan.settings.clone() }, ..plan.clone() };
     shared(&gpu, &scene, &view, &masked(&few(&first)), &albedo)?;
-    let (a_masks, of_masks) = shared(&gpu, &scene, &view, &masked(&first), &albedo)?;
-    let (b_masks, _) = shared(&gpu, &scene, &view, &masked(&second), &albedo)?;
+    let (a_masks, of_masks, _) = shared(&gpu, &scene, &view, &masked(&first), &albedo)?;
+    let (b_masks, ..) = shared(&gpu, &scene, &view, &masked(&second), &albedo)?;
     let of_shared: Vec<f64> = a.iter().zip(&b).map(|(a, b)| noise(a, b)).map(|(noise, mean)| noise / mean).collect();
     let [paths, compression] = spent;
     println!("{lit} lit frames of {}; shared: {samples} paths a pixel", first.steps);
@@ -393,6 +422,17 @@ fn run() -> Result<()> {
     let [masks, masks_compression] = of_masks;
     row_of("shared paths, sun masks", masks.seconds());
     row_of("the same with compression", masks.seconds() + masks_compression.seconds());
+    let summary = stored.summary();
+    println!(
+        "bytes: {} as 16-bit floats of all frames, {} compressed ({:.1} %), {:.1} images a tile; worst frame {:.2} % off, tile {:.2} %",
+        summary.raw_bytes,
+        summary.bytes,
+        100.0 * summary.bytes as f64 / summary.raw_bytes as f64,
+        summary.images,
+        100.0 * summary.worst_frame,
+        100.0 * summary.worst_tile
+    );
+    println!("a picture from the bake: {:.1} ms of wall clock", picture_ms(&gpu, &scene, &view, stored)?);
     for (goal, spent, what) in [(GOAL, paths, "exact shadow rays"), (MASKS_GOAL, masks, "sun masks")] {
         let verdict = if spent.seconds() <= goal * each { "reached" } else { "missed" };
         println!("goal with {what}, at most 1/{:.0} of one by one at the noise of each time: {verdict}", 1.0 / goal);

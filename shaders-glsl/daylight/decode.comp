@@ -132,7 +132,7 @@ TexelLight lightmap_light(vec2 place) {
         add(sum, texel_light(uvec2(texel)), weight);
     }
     if (sum.there < 1e-3) {
-        // All four are buried, as beside a thing that hides the middles of texels. Charts are farther apart than the texels around them.
+        // All four are buried, as in a gap between things that is narrower than a texel. Other charts are at least four free texels away.
         for (int i = 0; i < 16; ++i) {
             ivec2 step = ivec2(i % 4 - 1, i / 4 - 1);
             ivec2 texel = ivec2(corner) + step;

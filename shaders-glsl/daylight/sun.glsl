@@ -5,8 +5,8 @@
 // 1: masks say from where the sun is seen. 0: a shadow ray from each vertex finds it.
 layout(constant_id = 0) const uint MASKS = 0;
 
-// Russian roulette of shadow rays. A vertex costs a ray for each time of the day. A ray is sent with a probability if the share of the first vertex's
-// weight times the cosine at the sun is below this value: late vertices carry little light, and so do surfaces that the sun grazes.
+// Russian roulette of shadow rays. A vertex costs a ray for each time of the day. Where a vertex's share times its cosine at the
+// sun is below this value, a ray is sent with a probability: late vertices carry little light, and so do surfaces that the sun grazes.
 const float SHADOW_ROULETTE = 0.3;
 
 // Light by the sun for 1 W/m² at normal incidence. `sun`: as for day_sun_ray(). `around`: sun_frame(sun).

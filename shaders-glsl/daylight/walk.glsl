@@ -97,7 +97,9 @@ void main() {
 #ifdef PROBES
             if (surface == 1u) start.distance = s.inside ? -hit.t : hit.t;
 #else
-            if (surface == 1u && (s.inside || hit.t < settings.touching)) atomicAdd(buried[receiver], 1u);
+            // Light goes through glass.
+            bool buries = s.glass == 0.0 && (s.inside || hit.t < settings.touching);
+            if (surface == 1u && settings.touching > 0.0 && buries) atomicAdd(buried[receiver], 1u);
 #endif
             if (s.unlit) break;
             vec3 above = s.position + (s.side - direction) * s.gap;

@@ -24,7 +24,7 @@ pub struct Light {
 }
 
 impl Light {
-    /// The light of the sun, of the sky and of lamps, with its noise. `dimensions`: [`Plan::dimensions`].
+    /// The light of the sun, of the sky and of lamps, with its noise. `dimensions`: [`Plan::dimensions`](super::Plan::dimensions).
     pub fn measured(&self, dimensions: [usize; 3]) -> [Measured<'_>; 3] {
         let rows = [(&self.sun, &self.noise), (&self.sky, &self.sky_noise), (&self.lamps, &self.lamps_noise)];
         let mut dimensions = dimensions.into_iter();
@@ -32,9 +32,11 @@ impl Light {
     }
 
     /// The light without the texels that are `buried`: those of a floor under a column that stands in it, or of the part of a wall that is in another
-    /// wall. They are black, and texels beside them are seen, so that black would be mixed into the picture. `texels`: the number of each texel in
-    /// its tile; `mask`: of the tile, without bits.
+    /// wall. They are black, and their black would darken the pixels beside them. A tile of which nothing would be left keeps all texels: a shell around the whole
+    /// scene is no solid. `texels`: the number of each texel in its tile; `mask`: of the tile, without bits.
     pub(super) fn without(mut self, buried: &[bool], texels: &[u32], mut mask: Vec<u32>) -> Self {
+        let none = vec![false; buried.len()];
+        let buried = if buried.iter().all(|buried| *buried) { &none } else { buried };
         for (texel, _) in texels.iter().zip(buried).filter(|(_, buried)| !**buried) {
             mask[*texel as usize / 32] |= 1 << (texel % 32);
         }
@@ -52,9 +54,9 @@ impl Light {
 }
 
 /// Whether a texel of which so many paths begin inside of a solid, or under a thing, is buried. A texel beside a wall has some such paths, and on the
-/// outside of an open shell nearly half of them may hit its inside.
+/// outside of an open shell nearly half of them may hit its inside. Few paths say too little.
 pub(super) fn is_buried(paths: u32, samples: u32) -> bool {
-    16 * u64::from(paths) >= 15 * u64::from(samples)
+    samples >= 16 && 16 * u64::from(paths) >= 15 * u64::from(samples)
 }
 
 /// Rows of means and of noise from sums in the order of the device: for each receiver and dimension the sums of even and of odd samples.

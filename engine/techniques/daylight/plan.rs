@@ -42,7 +42,7 @@ pub enum Kind {
     /// All surfaces: a lightmap for a free camera.
     Lightmap {
         charts: u32,
-        /// Texels on surfaces.
+        /// Texels on surfaces, those included that are left out because they are inside of solids.
         covered: u64,
         /// Digest of the corners of all triangles.
         corners: Digest,

@@ -2,13 +2,13 @@
 //!
 //! A path starts at a texel and ends in the sky or after some scatterings. Its vertices do not depend on the time, so each vertex sends one
 //! shadow ray to each position of the sun, or reads its visibility from a mask ([`super::masks`]). A day costs one set of paths and many coherent
-//! shadow rays, instead of a set of paths for each time. Russian roulette decides whether late vertices send
-//! their shadow rays.
+//! shadow rays, instead of a set of paths for each time. Russian roulette decides whether the shadow rays of late vertices, and of surfaces
+//! that the sun grazes, are sent.
 //! Light is linear in the sun, so the sun is white and has an irradiance of 1 W/m² at normal incidence.
 
 use super::{
     Baking, Group, Kind, Plan,
-    adaptive::{SPARSE_PATHS, Sparse},
+    adaptive::{Adaptive, SPARSE_PATHS, Sparse},
     beam::SUN_ANGULAR_RADIUS,
     gathered::Spot,
     light::{Light, is_buried, summed},
@@ -36,6 +36,7 @@ use crate::{
 };
 
 /// A path of a texel of a lightmap that ends at a surface within this part of the texel's side begins under a thing that lies on the texel.
+/// The side is that of `bake.density`; charts of a file's own coordinates may have other sides.
 const TOUCHING: f32 = 0.25;
 /// Paths of a texel in one batch at most.
 const BATCH: u32 = 16;
@@ -173,15 +174,19 @@ impl Transport {
         Ok(Sparse { light: Light { mask, ..light }, extent })
     }
 
-    /// Bytes of the device's memory for the light of a tile with so many texels on surfaces, besides the scene.
+    /// Bytes of the device's memory for the light of a tile with so many texels on surfaces, about, besides the scene.
     pub fn bytes_of_tile(plan: &Plan, texels: u64) -> u64 {
-        let texels = texels.max(1);
+        let adaptive = plan.settings.adaptive != Adaptive::Off;
+        let texels = texels.max(if adaptive { SPARSE as u64 } else { 1 });
         let vertices = u64::from(consts::DAY_VERTICES);
-        let paths = (MOST_VERTICES / (texels * vertices)).clamp(1, BATCH.into()) * texels;
+        let paths = batch(texels) * texels;
         let of_path = vertices * size_of::<types::DayVertex>() as u64 + size_of::<types::DayEscape>() as u64 + 4;
         // Sums are on the device and in the buffer that the host reads.
         let sums: u64 = plan.dimensions().iter().map(|count| 2 * 24 * *count as u64).sum();
-        paths * of_path + texels * (sums + size_of::<types::Hit>() as u64 + size_of::<types::DaySpot>() as u64 + 4)
+        let masks =
+            if plan.settings.sun_masks > 0.0 { vertices * (4 + size_of::<types::DayMaskPoint>() as u64) } else { 0 };
+        paths * (of_path + masks)
+            + texels * (sums + size_of::<types::Hit>() as u64 + size_of::<types::DaySpot>() as u64 + 4)
     }
 
     /// Goes on with the times of another plan of the same texels.
@@ -255,8 +260,7 @@ impl Transport {
         }
         let times = plan.times.len() as u32;
         let mask_words = self.mask_words(plan)?;
-        let vertices = u64::from(count) * u64::from(consts::DAY_VERTICES);
-        let batch = (MOST_VERTICES / vertices).clamp(1, BATCH.into()) as u32;
+        let batch = batch(count.into()) as u32;
         let buffer = |name, bytes: u64| OwnedBuffer::new(&self.gpu, name, BufferDesc::device(bytes.max(16)));
         let paths = u64::from(count * batch);
         let receivers = OwnedBuffer::with_contents(&self.gpu, "daylight.receivers", bytemuck::cast_slice(hits))?;
@@ -389,6 +393,11 @@ impl Transport {
             return Ok((light, buried));
         }
     }
+}
+
+/// Paths of a texel in one batch, of a tile with so many texels.
+fn batch(texels: u64) -> u64 {
+    (MOST_VERTICES / (texels * u64::from(consts::DAY_VERTICES))).clamp(1, BATCH.into())
 }
 
 /// The lamps as they are sampled, made once.

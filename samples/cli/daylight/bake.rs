@@ -115,13 +115,14 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let gigabytes = |bytes: u64| bytes as f64 / 1e9;
     let [least, most] = need.machine.map(gigabytes);
     console.info(&format!(
-        "memory besides the scene: {:.2} GB of the device, and {least:.2} to {most:.2} GB of the machine, as the light needs",
+        "memory besides the scene, about: {:.2} GB of the device, and {least:.2} to {most:.2} GB of the machine, as the light needs",
         gigabytes(need.device)
     ));
-    need.expect_free(&plan, available())?;
     let mut transport = Transport::new(&gpu, &stage.scene, &plan, sources)?;
     let adaptive = thin_out(&mut plan, &mut transport)?;
     adaptive.iter().for_each(|(said, _)| console.info(said));
+    // Without the steps that are left out.
+    Need::new(&plan, of_tiles.as_deref()).expect_free(&plan, args.run.units.shard.is_some(), available())?;
     let masks = Cells::new(&stage.scene, &plan.settings, plan.times.len())?;
     if masks.count > 0 {
         let (points, spacing, bytes) = (masks.count, plan.settings.sun_masks, masks.bytes(plan.times.len()));

@@ -8,17 +8,19 @@ use lucerna::{
 /// Bytes that a bake needs besides the scene.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Need {
-    /// Of the device, for the tile with the most texels.
+    /// Bytes of the device for the tile with the most texels.
     pub device: u64,
-    /// Of the machine, at least and at most, when the light of all tiles is filtered and compressed. It depends on the number of vectors that
+    /// Bytes of the machine for one tile, which a shard needs.
+    pub tile: u64,
+    /// Bytes of the machine, at least and for the most vectors, when the light of all tiles is filtered and compressed. It depends on the number of vectors that
     /// describe the light.
     pub machine: [u64; 2],
 }
 
 /// Vectors of a kind of light at least, for an estimate, and at most.
 const VECTORS: [u64; 2] = [4, 128];
-/// Bytes of a texel besides its coefficients: its surface, and what the filter compares.
-const OF_TEXEL: u64 = 24 + 64;
+/// Bytes of a texel besides its coefficients: its surface, and what the filter compares, with copies that the filter makes.
+const OF_TEXEL: u64 = 24 + 2 * 64 + 32 + 44;
 /// Bytes of a vector's coefficients at a texel: three colours, mean and noise, 16 bits.
 const OF_VECTOR: u64 = 12;
 
@@ -36,21 +38,21 @@ impl Need {
         let (most, all) = (tiles.iter().copied().max().unwrap_or(0), tiles.iter().sum::<u64>());
         let dimensions = plan.dimensions();
         let device = Transport::bytes_of_tile(plan, most);
+        // Means and noise of all times, as numbers of 32 and of 64 bits.
+        let tile = dimensions.iter().map(|count| most * 3 * 2 * 12 * *count as u64).sum();
         let machine = VECTORS.map(|vectors| {
             let coefficients: u64 = dimensions.iter().map(|count| vectors.min(*count as u64)).sum();
-            // A tile is traced and coded meanwhile: means and noise of all times, as numbers of 32 and of 64 bits.
-            let of_one: u64 = dimensions.iter().map(|count| most * 3 * 2 * 12 * *count as u64).sum();
-            all * (OF_TEXEL + OF_VECTOR * coefficients) + of_one
+            all * (OF_TEXEL + OF_VECTOR * coefficients) + tile
         });
-        Self { device, machine }
+        Self { device, tile, machine }
     }
 
-    /// Refuses a bake that needs more than `free` bytes of the machine at least; `None`: unknown.
+    /// Refuses a bake, or with `shard` a part of it, that needs more than `free` bytes of the machine at least; `None`: unknown.
     ///
     /// # Errors
     /// `Usage` with both numbers, and what makes the bake smaller.
-    pub fn expect_free(&self, plan: &Plan, free: Option<u64>) -> Result<()> {
-        let [least, _] = self.machine;
+    pub fn expect_free(&self, plan: &Plan, shard: bool, free: Option<u64>) -> Result<()> {
+        let least = if shard { self.tile } else { self.machine[0] };
         let Some(free) = free.filter(|free| *free < least) else { return Ok(()) };
         let (key, help) = match plan.receivers {
             Kind::Lightmap { .. } => ("bake.density", "Choose fewer texels along a metre, or a larger bake.interval"),
@@ -96,9 +98,11 @@ mod tests {
         let plan = plan(256);
         let need = Need::new(&plan, None);
         let [least, _] = need.machine;
-        need.expect_free(&plan, Some(least)).unwrap();
-        need.expect_free(&plan, None).unwrap();
-        let error = need.expect_free(&plan, Some(least - 1)).unwrap_err();
+        need.expect_free(&plan, false, Some(least)).unwrap();
+        need.expect_free(&plan, false, None).unwrap();
+        // A shard has one tile at a time.
+        need.expect_free(&plan, true, Some(need.tile)).unwrap();
+        let error = need.expect_free(&plan, false, Some(least - 1)).unwrap_err();
         assert_eq!(error.exit_code(), 2);
         let text = error.to_string();
         for part in [&format!("{least} bytes"), &format!("{} are free", least - 1), "smaller picture", "--size"] {

@@ -225,6 +225,7 @@ impl DayOptions {
 #[serde(rename_all = "kebab-case")]
 pub enum KindArg {
     /// All surfaces, for a free camera
+    // `atlas` is another common word for it.
     #[value(alias = "atlas")]
     Lightmap,
     /// The pixels of the camera, for this camera and size alone

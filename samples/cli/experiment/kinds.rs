@@ -167,7 +167,7 @@ pub const KINDS: &[Kind] = &[
     Kind { render: fiv::picture, ..technique::of::<Fiv>() },
     Kind {
         name: "daylight",
-        description: "baked daylight at a time of the day (picture.daylight.time); layers direct, indirect, irradiance",
+        description: "baked daylight at a time of the day (picture.daylight.time), with an object that the bake does not know (object.builtin, object.x, object.y, object.height); layers direct, indirect, irradiance, object",
         on_device: true,
         of_images: false,
         settings: daylight::picture_settings,

@@ -27,13 +27,16 @@ fn parts(object: &Picture) -> Vec<usize> {
     let (width, height) = (object.width as usize, object.height as usize);
     let shows = |x: usize, y: usize| object.pixels[y * width + x][0] > 0.5;
     let reach = (width / BESIDE).max(1);
-    let near = |x: usize, y: usize| {
-        let rows = y.saturating_sub(reach)..(y + reach + 1).min(height);
-        rows.into_iter()
-            .any(|row| (x.saturating_sub(reach)..(x + reach + 1).min(width)).any(|column| shows(column, row)))
+    let around = |at: usize, most: usize| at.saturating_sub(reach)..(at + reach + 1).min(most);
+    let cells = || (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
+    let in_row: Vec<bool> = cells().map(|(x, y)| around(x, width).any(|column| shows(column, y))).collect();
+    let near = |x: usize, y: usize| around(y, height).any(|row| in_row[row * width + x]);
+    let part = |(x, y): (usize, usize)| match (shows(x, y), near(x, y)) {
+        (true, _) => 0,
+        (false, true) => 1,
+        (false, false) => 2,
     };
-    let part = |x: usize, y: usize| if shows(x, y) { 0 } else { if near(x, y) { 1 } else { 2 } };
-    (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| part(x, y)).collect()
+    cells().map(part).collect()
 }
 
 /// Sums of the pixels of a part.
@@ -50,7 +53,7 @@ fn ratio(found: f64, wanted: f64) -> Option<f64> {
 pub(super) fn section(results: &Results) -> Result<Option<Section>> {
     let mut section = Section::new("Figures 2 and 5: an object that is added after the bake");
     section.text(
-        "A pot stands on the floor. The bake does not know it, and the path tracer does. It has direct light of the sun and casts its shadow; its \
+        "An object (as shipped, a pot) stands on the surface that is seen at a point of the picture. The bake does not know it, and the path tracer does. It has direct light of the sun and casts its shadow; its \
          indirect light comes from probes, or as in the paper from the baked light of the surface behind it. What the bake cannot have is light that \
          the object blocks or reflects to its surroundings: beside the object the baked light is too large, and the object's colour is missing. The \
          numbers are of the picture's light over that of the reference. The paper shows pictures and gives no numbers; its object is a red teapot.",

@@ -6,6 +6,7 @@ use lucerna::{
     Error, Result,
     gpu::Gpu,
     graph::Runner,
+    image::Layer,
     scene::{Pose, Scene},
     technique::{Ready, Shot},
     techniques::daylight::{
@@ -51,6 +52,8 @@ struct Shown {
     pose: Pose,
     ready: Ready<Daylight>,
     runner: Runner,
+    /// Where the object is seen.
+    seen: Option<Layer>,
 }
 
 /// The bake for these settings, with `probes` or without; `None` if it was interrupted.
@@ -134,16 +137,15 @@ impl Kept {
             let baked = Baked { stored: self.stored.clone(), frames: None, stream: None, file: None, digest: None };
             let ready = Ready::new(gpu, &scene, settings, Some(&baked), &mut |_, _| true)?;
             let pose = Pose::rest(&scene);
-            self.ready = Some(Shown { object: object.clone(), scene, pose, ready, runner: Runner::new(gpu) });
+            let seen = object.is_some().then(|| object::layer(&scene, job.view));
+            self.ready = Some(Shown { object: object.clone(), scene, pose, ready, runner: Runner::new(gpu), seen });
         }
-        let Some(Shown { scene, pose, ready, runner, .. }) = &mut self.ready else { return Ok(None) };
+        let Some(Shown { scene, pose, ready, runner, seen, .. }) = &mut self.ready else { return Ok(None) };
         let rendered = on_device(runner, job, "daylight", |graph| {
             ready.frame(graph, (scene, pose), job.view, Shot::default(), settings)
         })?;
         Ok(rendered.map(|mut rendered| {
-            if object.is_some() {
-                rendered.layers.layers.push(object::layer(scene, job.view));
-            }
+            rendered.layers.layers.extend(seen.clone());
             rendered
         }))
     }

@@ -13,7 +13,7 @@ use lucerna::{
     image::{Layer, Layers, Precision},
     scene::{Environment, Light, LightKind, Node, Pose, Scene, Transform, environment::direction_from_uv},
     technique::Settings as _,
-    techniques::daylight::{Added, Baking, PictureSettings, Settings, Sky},
+    techniques::daylight::{Baking, PictureSettings, Settings, Sky},
     tracer,
 };
 use serde::{Deserialize, Serialize};
@@ -126,7 +126,7 @@ pub(super) fn truth_settings(paper: bool, changes: &Changes) -> Result<Value> {
 pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
     let OfPicture { day, kind, bake, picture, object } = read(job.settings)?;
     let gpu = warm.gpu.clone();
-    let probes = object.is_some() && picture.daylight.added == Added::Probes;
+    let probes = object.is_some();
     let Some(bake) = baked::of(warm, job, (&day, kind, &bake), probes)? else { return Ok(None) };
     let rendered = bake.render(&gpu, job, &picture, &object)?;
     Ok(rendered.map(|mut rendered| {

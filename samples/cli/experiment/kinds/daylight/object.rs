@@ -38,7 +38,9 @@ impl Object {
         let shares = [("object.x", self.x, 0.0), ("object.y", self.y, 0.0), ("object.height", self.height, 0.01)];
         lucerna_scenes::load(&self.builtin)?;
         match shares.iter().find(|(_, value, least)| !(*least..=1.0).contains(value)) {
-            Some((key, value, least)) => Err(Error::usage(format!("{key} is {value}, allowed are {least} to 1"))),
+            Some((key, value, least)) => {
+                Err(Error::usage(format!("{value} is not allowed, but {least} to 1 are")).at(*key))
+            }
             None => Ok(()),
         }
     }
