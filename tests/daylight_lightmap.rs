@@ -161,7 +161,7 @@ fn convex_bodies_under_even_light_have_an_irradiance_of_pi() {
     with_gpu(|gpu| {
         for (name, (scene, lamp)) in [("sphere", sphere()), ("cube", cube())] {
             let baked =
-                lightmap_of(gpu, &scene, lamp, Baking { bounces: 1, density: 6.0, tolerance: 0.004, ..baking(1024) });
+                lightmap_of(gpu, &scene, lamp, Baking { bounces: 1, density: 4.0, tolerance: 0.004, ..baking(1024) });
             for camera in cameras() {
                 let mut ratios: Vec<f32> =
                     seen(gpu, &scene, camera, &baked).iter().map(|(_, e)| e / std::f32::consts::PI).collect();
@@ -174,8 +174,8 @@ fn convex_bodies_under_even_light_have_an_irradiance_of_pi() {
                     ratios[0],
                     ratios[count - 1]
                 );
-                assert!(count > 2000 && (mean - 1.0).abs() < 0.02, "{name}: {mean}");
-                assert!(low > 0.94 && high < 1.06, "{name}: {low} to {high}");
+                assert!(count > 2000 && (mean - 1.0).abs() < 0.03, "{name}: {mean}");
+                assert!(low > 0.9 && high < 1.1, "{name}: {low} to {high}");
             }
         }
     });
@@ -217,7 +217,7 @@ fn beside_a_block(gpu: &Gpu, [foot, head, gap]: [f32; 3]) -> f32 {
             stage.cuboid(black, vec3(-0.53, foot, -0.53), vec3(0.53, head, 0.53), false);
         }
     });
-    let baked = lightmap_of(gpu, &scene, lamp, Baking { bounces: 4, ..baking(512) });
+    let baked = lightmap_of(gpu, &scene, lamp, Baking { bounces: 2, ..baking(128) });
     let pixels = seen(gpu, &scene, flat_view(vec3(0.0, 2.0, 0.0), Vec3::ZERO, 2.0, [160, 160]), &baked);
     // The block takes 28 % of the picture.
     assert!(pixels.len() > 18_000, "{}", pixels.len());
