@@ -7,7 +7,7 @@ usage: read_day.py FILE.day                       what the file holds
        read_day.py FILE.day lamps NUMBER          for a group of lamps
 
 Prints a line for each texel on a surface: its column, its row, and red, green and blue in W/m². docs/daylight-file.md describes the file. Images in
-blocks (bake.format other than plain) are not read.
+blocks (bake.format other than plain) and probes are not read, and the digest at the end is not checked.
 """
 import json
 import struct
@@ -58,7 +58,7 @@ def read(path):
     with open(path, "rb") as file:
         raw = file.read()
     if raw[:8] != b"lucday\r\n":
-        sys.exit(f"{path}: is no file of baked daylight")
+        sys.exit(f"{path}: is not a file of baked daylight")
     version, length = struct.unpack_from("<2I", raw, 8)
     if version != 2:
         sys.exit(f"{path}: has version {version}, and this program reads version 2")
@@ -77,7 +77,7 @@ def read(path):
 
 
 def main():
-    if len(sys.argv) not in (2, 4) or len(sys.argv) == 4 and sys.argv[2] not in KINDS:
+    if len(sys.argv) not in (2, 4) or len(sys.argv) == 4 and not (sys.argv[2] in KINDS and sys.argv[3].isdecimal()):
         sys.exit(__doc__)
     plan, tiles = read(sys.argv[1])
     width, height = plan["extent"]
@@ -90,7 +90,7 @@ def main():
     side = plan["settings"]["tile"] or max(width, height)
     columns = -(-width // side)
     for index, (mask, layers) in enumerate(tiles):
-        if not 0 <= number < layers[kind].dimensions:
+        if number >= layers[kind].dimensions:
             sys.exit(f"{sys.argv[2]} has the numbers 0 to {layers[kind].dimensions - 1}, not {number}")
         x, y = index % columns * side, index // columns * side
         across = min(side, width - x)

@@ -26,7 +26,7 @@ struct DaySettings {
     uint lights;          // of the scene
     uint groups;          // of lamps
     float sun_radius;     // tangent of the angular radius of the sun's disc
-    float touching;       // metres: surfaces that are nearer to a texel of a lightmap bury it
+    float touching;       // surfaces that are nearer to a texel of a lightmap, metres, lie on it; 0: no lightmap
     uint mask_words;      // of 32 times each for a side of a cell of the sun masks; 0: there are no masks
 };
 
@@ -36,7 +36,7 @@ struct DayVertex {
     vec3 normal;     // shading normal, unit
     vec3 geometric;  // of the triangle, unit, on the side of the normal
     vec3 weight;     // irradiance at the receiver for each W/m² of irradiance at the vertex
-    float share;     // the weight, relative to that of the first vertex of the path
+    float share;     // the brightest channel of the weight, relative to that of the first vertex of the path
     uint side;       // of a cell of the sun masks, if there are any (daylight/masks.glsl)
 };
 

@@ -132,9 +132,11 @@ TexelLight lightmap_light(vec2 place) {
         add(sum, texel_light(uvec2(texel)), weight);
     }
     if (sum.there < 1e-3) {
-        // All four are buried, as in a gap between things that is narrower than a texel. Other charts are at least four free texels away.
+        // All four are buried, as in a gap between objects that is narrower than a texel. The texels around them belong to the same chart, for charts
+        // are padded by more (atlas::Settings::padding).
         for (int i = 0; i < 16; ++i) {
             ivec2 step = ivec2(i % 4 - 1, i / 4 - 1);
+            if (all(equal(step & ~1, ivec2(0)))) continue;
             ivec2 texel = ivec2(corner) + step;
             if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(uvec2(texel), texels))) continue;
             vec2 off = vec2(step) - f;

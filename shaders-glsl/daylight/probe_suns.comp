@@ -10,7 +10,7 @@
 #include "daylight/daylight.glsl"
 #include "daylight/probe.glsl"
 
-layout(local_size_x = 32) in; // DAY_TIMES
+layout(local_size_x = DAY_TIMES) in;
 
 layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
 layout(binding = 1, scalar) readonly buffer Suns { vec4 suns[]; };      // as in daylight/sun.glsl

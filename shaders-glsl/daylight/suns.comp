@@ -10,7 +10,7 @@
 #include "lib/trace.glsl"
 #include "daylight/daylight.glsl"
 
-layout(local_size_x = 32) in; // DAY_TIMES
+layout(local_size_x = DAY_TIMES) in;
 
 layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
 // Unit vector towards the sun and 0, or the place of a sun that is a point, and its squared distance from the centre of its path.

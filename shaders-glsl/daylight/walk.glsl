@@ -24,7 +24,7 @@ layout(binding = 12, scalar) writeonly buffer Starts { DayStart starts[]; };
 // Their t is positive for the front of a triangle and negative for its back.
 layout(binding = 8, scalar) readonly buffer Receivers { Hit receivers[]; };
 layout(binding = 14, scalar) writeonly buffer Spots { DaySpot spots[]; };
-// For each receiver: the paths that begin inside of a solid, or under a thing that lies on the surface.
+// For each receiver of a lightmap: the paths that begin inside of a solid, or under an object that lies on the surface.
 layout(binding = 20, scalar) buffer Buried { uint buried[]; };
 #endif
 layout(binding = 9, scalar) writeonly buffer Vertices { DayVertex vertices[]; };
@@ -97,9 +97,10 @@ void main() {
 #ifdef PROBES
             if (surface == 1u) start.distance = s.inside ? -hit.t : hit.t;
 #else
-            // Light goes through glass.
-            bool buries = s.glass == 0.0 && (s.inside || hit.t < settings.touching);
-            if (surface == 1u && settings.touching > 0.0 && buries) atomicAdd(buried[receiver], 1u);
+            if (surface == 1u && settings.touching > 0.0) {
+                // Light goes through glass.
+                if (s.glass == 0.0 && (s.inside || hit.t < settings.touching)) atomicAdd(buried[receiver], 1u);
+            }
 #endif
             if (s.unlit) break;
             vec3 above = s.position + (s.side - direction) * s.gap;

@@ -1,15 +1,18 @@
-//! `daylight` from the outside: bakes that are killed, lamps by name, memory, objects that are added, and light that adds up.
+//! `daylight` from the outside: bakes that are killed, a reader in another language, lamps by name, memory, objects that are added, and light that
+//! adds up.
 
 use std::{
     fs,
     path::{Path, PathBuf},
+    process::Command,
     time::{Duration, Instant},
 };
 
-use crate::support::{Ran, command, device, files, ran};
+use crate::support::{Ran, command, device, files, of_project, ran};
 use lucerna::{
     image::{self, Layers},
     scene::Limits,
+    techniques::daylight::Stored,
 };
 
 struct Lab(tempfile::TempDir);
@@ -92,7 +95,7 @@ fn a_bake_with_masks_and_probes_that_is_killed_in_any_number_of_shards_has_the_s
         return;
     }
     let lab = Lab::new();
-    let told = ["memory besides the scene, about:", "GB of the device", "sun masks of", "wrote whole.day"];
+    let told = ["the bake needs about", "GB of device memory", "sun masks of", "wrote whole.day"];
     lab.bake("whole.day", &[]).expect(0, &told);
     let whole = fs::read(lab.at("whole.day")).unwrap();
     for (shards, kills) in [(1, &[1, 4][..]), (2, &[2, 5]), (5, &[1, 4])] {
@@ -111,6 +114,58 @@ fn a_bake_with_masks_and_probes_that_is_killed_in_any_number_of_shards_has_the_s
         lab.bake(&out, &[]).expect(0, &["wrote"]);
         assert!(fs::read(lab.at(&out)).unwrap() == whole, "{shards} shards");
         assert!(!lab.at(&format!("{out}.parts")).exists());
+    }
+}
+
+#[test]
+fn a_reader_without_packages_finds_the_light_that_the_engine_decodes() {
+    let python = Command::new("python3").arg("--version").output();
+    if python.is_err() {
+        assert!(std::env::var_os("CI").is_none(), "python3 is not installed");
+        println!("skipped: python3 is not installed");
+        return;
+    }
+    if !device() {
+        return;
+    }
+    let lab = Lab::new();
+    let small = ["-D", "bake.samples=16", "-D", "bake.bounces=2", "-D", "bake.interval=120", "-D", "bake.probes=0"];
+    let place = ["--builtin", "hall", "--size", "40x18", "--kind", "view", "-o", "a.day"];
+    lab.run(&[&["bake"][..], &place, &small].concat()).expect(0, &[]);
+    let stored = Stored::read(&lab.at("a.day")).unwrap();
+    let reader = of_project("samples/daylight/read_day.py");
+    for (kind, number) in [("sun", 3), ("sky", 145), ("lamps", 0)] {
+        let words = [kind, &number.to_string()];
+        let out = Command::new("python3").arg(&reader).arg(lab.at("a.day")).args(words).output().unwrap();
+        assert!(out.status.success(), "{}", String::from_utf8_lossy(&out.stderr));
+        let text = String::from_utf8(out.stdout).unwrap();
+        let mut lines = text.lines();
+        let (mut texels, mut lit) = (0, 0);
+        for (index, tile) in stored.tiles.iter().enumerate() {
+            let layer = match kind {
+                "sun" => &tile.sun,
+                "sky" => &tile.sky,
+                _ => &tile.lamps,
+            };
+            let coefficients = layer.mix([(number, [1.0; 3])].into_iter());
+            for (texel, [x, y]) in stored.plan.covered(index as u32, &tile.mask).enumerate() {
+                let numbers: Vec<f64> =
+                    lines.next().unwrap().split(' ').map(|number| number.parse().unwrap()).collect();
+                assert_eq!(numbers[..2], [f64::from(x), f64::from(y)]);
+                for (found, wanted) in numbers[2..].iter().zip(layer.decode(texel, &coefficients)) {
+                    let wanted = f64::from(wanted);
+                    assert!((found - wanted).abs() < 1e-5 + 1e-4 * wanted.abs(), "{kind}: {found}, not {wanted}");
+                    lit += usize::from(wanted > 1e-3);
+                }
+                texels += 1;
+            }
+        }
+        assert!(lines.next().is_none() && texels > 600 && lit > 100, "{kind}: {texels} texels, {lit} lit values");
+    }
+    for (words, said) in [(&["sun", "99"][..], "0 to"), (&["sun", "x"], "usage"), (&["wind", "0"], "usage")] {
+        let out = Command::new("python3").arg(&reader).arg(lab.at("a.day")).args(words).output().unwrap();
+        let text = String::from_utf8_lossy(&out.stderr).into_owned();
+        assert!(!out.status.success() && text.contains(said), "{words:?}: {text}");
     }
 }
 

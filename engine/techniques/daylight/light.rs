@@ -32,11 +32,9 @@ impl Light {
     }
 
     /// The light without the texels that are `buried`: those of a floor under a column that stands in it, or of the part of a wall that is in another
-    /// wall. They are black, and their black would darken the pixels beside them. A tile of which nothing would be left keeps all texels: a shell around the whole
-    /// scene is no solid. `texels`: the number of each texel in its tile; `mask`: of the tile, without bits.
-    pub(super) fn without(mut self, buried: &[bool], texels: &[u32], mut mask: Vec<u32>) -> Self {
-        let none = vec![false; buried.len()];
-        let buried = if buried.iter().all(|buried| *buried) { &none } else { buried };
+    /// wall. They are black, and their black would darken the pixels beside them. `texels`: the number of each texel in its tile; `mask`: of the tile,
+    /// without bits.
+    pub(super) fn without_buried(mut self, buried: &[bool], texels: &[u32], mut mask: Vec<u32>) -> Self {
         for (texel, _) in texels.iter().zip(buried).filter(|(_, buried)| !**buried) {
             mask[*texel as usize / 32] |= 1 << (texel % 32);
         }
@@ -53,10 +51,15 @@ impl Light {
     }
 }
 
-/// Whether a texel of which so many paths begin inside of a solid, or under a thing, is buried. A texel beside a wall has some such paths, and on the
-/// outside of an open shell nearly half of them may hit its inside. Few paths say too little.
+/// Paths that say whether a texel is buried, at least.
+const LEAST_BURIED: u32 = 16;
+/// Sixteenths of the paths of a buried texel that begin inside of a solid or under an object, at least. A texel beside a wall has some such paths, and on
+/// the outside of an open shell nearly half of them may hit its inside.
+const BURIED_SIXTEENTHS: u64 = 15;
+
+/// Whether a texel of which so many paths begin inside of a solid, or under an object, is buried.
 pub(super) fn is_buried(paths: u32, samples: u32) -> bool {
-    samples >= 16 && 16 * u64::from(paths) >= 15 * u64::from(samples)
+    samples >= LEAST_BURIED && 16 * u64::from(paths) >= BURIED_SIXTEENTHS * u64::from(samples)
 }
 
 /// Rows of means and of noise from sums in the order of the device: for each receiver and dimension the sums of even and of odd samples.

@@ -9,7 +9,7 @@ use crate::{
 
 /// The items of the passes that add the light of the sun, for some receivers, times and paths of each receiver.
 pub(super) fn sun_items([receivers, times, paths]: [u32; 3], bounces: u64, mask_words: u32, most_turns: u64) -> Items {
-    // About half of all vertices are there, and fewer than half of them face the sun and send their rays. To read a bit takes a fraction of a ray's time.
+    // About half of all vertices are there, and at most half of them face the sun and send their rays. To read a bit takes a fraction of a ray's time.
     let each = if mask_words == 0 { bounces.div_ceil(4) } else { 1 };
     let turns = if mask_words == 0 { bounces * most_turns } else { bounces };
     Items::new(paths).rays(u64::from(receivers) * u64::from(times) * each).turns(turns)

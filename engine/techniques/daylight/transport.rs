@@ -35,7 +35,7 @@ use crate::{
     },
 };
 
-/// A path of a texel of a lightmap that ends at a surface within this part of the texel's side begins under a thing that lies on the texel.
+/// A path of a texel of a lightmap that meets a surface within this share of the texel's side begins under an object that lies on the texel.
 /// The side is that of `bake.density`; charts of a file's own coordinates may have other sides.
 const TOUCHING: f32 = 0.25;
 /// Paths of a texel in one batch at most.
@@ -130,7 +130,7 @@ impl Transport {
                 let of_tile = tiles.get(tile as usize).map_or(&[][..], Vec::as_slice);
                 let (texels, hits): (Vec<u32>, Vec<types::Hit>) = of_tile.iter().copied().unzip();
                 let (light, buried) = self.gather(plan, plan.first_receiver(tile), &hits)?;
-                return Ok(light.without(&buried, &texels, mask));
+                return Ok(light.without_buried(&buried, &texels, mask));
             }
         };
         let (light, _) = self.gather(plan, plan.first_receiver(tile), &hits)?;
@@ -252,7 +252,7 @@ impl Transport {
         done
     }
 
-    /// The light of some surface points, and whether each of them is buried ([`Light::without`]); `first`: number of the first in the whole bake.
+    /// The light of some surface points, and whether each of them is buried ([`Light::without_buried`]); `first`: number of the first in the whole bake.
     fn gather(&mut self, plan: &Plan, first: u32, hits: &[types::Hit]) -> Result<(Light, Vec<bool>)> {
         let count = hits.len() as u32;
         if count == 0 {

@@ -13,7 +13,7 @@ use serde_json::json;
 
 use super::{
     info,
-    memory::Need,
+    memory::Memory,
     plan::{DayOptions, KindArg, Planned, plan, thin_out},
 };
 use crate::{
@@ -111,18 +111,12 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
         Sources::View(_) | Sources::Cube(_) => None,
         Sources::Lightmap(tiles) => Some(tiles.iter().map(|tile| tile.len() as u64).collect()),
     };
-    let need = Need::new(&plan, of_tiles.as_deref());
-    let gigabytes = |bytes: u64| bytes as f64 / 1e9;
-    let [least, most] = need.machine.map(gigabytes);
-    console.info(&format!(
-        "memory besides the scene, about: {:.2} GB of the device, and {least:.2} to {most:.2} GB of the machine, as the light needs",
-        gigabytes(need.device)
-    ));
     let mut transport = Transport::new(&gpu, &stage.scene, &plan, sources)?;
     let adaptive = thin_out(&mut plan, &mut transport)?;
     adaptive.iter().for_each(|(said, _)| console.info(said));
-    // Without the steps that are left out.
-    Need::new(&plan, of_tiles.as_deref()).expect_free(&plan, args.run.units.shard.is_some(), available())?;
+    let memory = Memory::new(&plan, of_tiles.as_deref());
+    console.info(&memory.to_string());
+    memory.expect_free(&plan, args.run.units.shard.is_some(), available())?;
     let masks = Cells::new(&stage.scene, &plan.settings, plan.times.len())?;
     if masks.count > 0 {
         let (points, spacing, bytes) = (masks.count, plan.settings.sun_masks, masks.bytes(plan.times.len()));
@@ -153,6 +147,15 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
                 meter.show(done as u64, 0);
                 Interrupt::stop().check()
             })?;
+            if let Kind::Lightmap { covered, .. } = plan.receivers {
+                let kept: u64 = stored.tiles.iter().map(|tile| u64::from(tile.there())).sum();
+                if kept < covered {
+                    console.info(&format!(
+                        "note: {} of {covered} texels are inside of solids or under objects and have no light of their own",
+                        covered - kept
+                    ));
+                }
+            }
             let saving = interrupt.saving();
             let bytes = stored.encode()?;
             image::write_atomic(&args.run.output, &bytes, args.run.overwrite)?;

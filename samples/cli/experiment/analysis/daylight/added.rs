@@ -54,8 +54,8 @@ pub(super) fn section(results: &Results) -> Result<Option<Section>> {
     let mut section = Section::new("Figures 2 and 5: an object that is added after the bake");
     section.text(
         "An object (as shipped, a pot) stands on the surface that is seen at a point of the picture. The bake does not know it, and the path tracer does. It has direct light of the sun and casts its shadow; its \
-         indirect light comes from probes, or as in the paper from the baked light of the surface behind it. What the bake cannot have is light that \
-         the object blocks or reflects to its surroundings: beside the object the baked light is too large, and the object's colour is missing. The \
+         indirect light comes from probes, or as in the paper from the baked light of the surface behind it. The bake does not know which light \
+         the object blocks and which light it reflects: beside the object the baked light may be too large or too small, and the object's colour is missing. The \
          numbers are of the picture's light over that of the reference. The paper shows pictures and gives no numbers; its object is a red teapot.",
     );
     let columns = [

@@ -105,8 +105,13 @@ fn make(
         }
     }
     let tiles = finish::tiles(&plan, &gathered, |_| Ok(()))?;
-    let brick = |index: u32| Brick::compress(&plan, transport.brick(&plan, index)?, &skies);
-    let probes = (0..plan.brick_count()).map(brick).collect::<Result<Vec<_>>>()?;
+    let mut probes = Vec::new();
+    for index in 0..plan.brick_count() {
+        if job.interrupt.requested() {
+            return Ok(None);
+        }
+        probes.push(Brick::compress(&plan, transport.brick(&plan, index)?, &skies)?);
+    }
     let seconds = begun.elapsed().as_secs_f64();
     let stored = Stored { plan: plan.clone(), tiles, probes, corners };
     let summary = stored.summary();
@@ -132,15 +137,18 @@ impl Kept {
         settings: &PictureSettings,
         object: &Object,
     ) -> Result<Option<Rendered>> {
-        if self.ready.as_ref().is_none_or(|shown| shown.object != *object) {
-            let scene = dark(&object.added_to(&self.scene, job.view)?);
-            let baked = Baked { stored: self.stored.clone(), frames: None, stream: None, file: None, digest: None };
-            let ready = Ready::new(gpu, &scene, settings, Some(&baked), &mut |_, _| true)?;
-            let pose = Pose::rest(&scene);
-            let seen = object.is_some().then(|| object::layer(&scene, job.view));
-            self.ready = Some(Shown { object: object.clone(), scene, pose, ready, runner: Runner::new(gpu), seen });
-        }
-        let Some(Shown { scene, pose, ready, runner, seen, .. }) = &mut self.ready else { return Ok(None) };
+        let shown = match self.ready.take().filter(|shown| shown.object == *object) {
+            Some(shown) => shown,
+            None => {
+                let scene = dark(&object.added_to(&self.scene, job.view)?);
+                let baked = Baked { stored: self.stored.clone(), frames: None, stream: None, file: None, digest: None };
+                let ready = Ready::new(gpu, &scene, settings, Some(&baked), &mut |_, _| true)?;
+                let pose = Pose::rest(&scene);
+                let seen = object.is_some().then(|| object::layer(&scene, job.view));
+                Shown { object: object.clone(), scene, pose, ready, runner: Runner::new(gpu), seen }
+            }
+        };
+        let Shown { scene, pose, ready, runner, seen, .. } = self.ready.insert(shown);
         let rendered = on_device(runner, job, "daylight", |graph| {
             ready.frame(graph, (scene, pose), job.view, Shot::default(), settings)
         })?;

@@ -1,6 +1,6 @@
 //! An object that stands in a scene after its bake, as in figure 2 of the paper.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use lucerna::{
     Error, Result,
     image::Layer,
@@ -38,9 +38,7 @@ impl Object {
         let shares = [("object.x", self.x, 0.0), ("object.y", self.y, 0.0), ("object.height", self.height, 0.01)];
         lucerna_scenes::load(&self.builtin)?;
         match shares.iter().find(|(_, value, least)| !(*least..=1.0).contains(value)) {
-            Some((key, value, least)) => {
-                Err(Error::usage(format!("{value} is not allowed, but {least} to 1 are")).at(*key))
-            }
+            Some((key, value, least)) => Err(Error::usage(format!("{value}; {least} to 1 are allowed")).at(*key)),
             None => Ok(()),
         }
     }
@@ -60,37 +58,27 @@ impl Object {
             let what = format!("no surface is seen at object.x = {}, object.y = {}", self.x, self.y);
             Error::usage(what).help("Choose another point of the picture")
         };
-        let distance = hit.ok_or_else(nothing)?.t;
+        let time = hit.ok_or_else(nothing)?.t;
         let object = lucerna_scenes::load(&self.builtin)?;
         let size = Bvh::build(&object, &Pose::rest(&object)).bounds().map_or(Vec3::ONE, |(low, high)| high - low);
-        let seen = 2.0 * half(view)[1] * if view.is_orthographic() { 1.0 } else { distance };
-        let scale = self.height * seen / size.y.max(1e-6);
-        let standing = Standing { foot: ray.origin + distance * ray.direction, scale, turn: 0.0 };
+        // The height of the picture at that distance, metres.
+        let [top, bottom] = [0.0, 1.0].map(|y| view.world_from_depth(Vec2::new(self.x, y), time));
+        let scale = self.height * top.distance(bottom) / size.y.max(1e-6);
+        let standing = Standing { foot: ray.origin + time * ray.direction, scale, turn: 0.0 };
         added::add(&mut scene, object, &standing)?;
         Ok(scene)
     }
 }
 
-/// Half of the width and of the height of the picture, metres at a distance of 1 m along the line of sight.
-fn half(view: &View) -> [f32; 2] {
-    let scale = view.clip_from_view;
-    [scale.x_axis.x, scale.y_axis.y].map(|size| 1.0 / size.abs())
-}
-
-/// The ray through a point of the picture; its time is the distance along the line of sight, metres.
+/// The ray through a point of the picture. Its time is 0 at the eye and 1 at the far plane.
 fn ray(view: &View, x: f32, y: f32) -> Ray {
-    let [right, up, forward] = view.axes();
-    let [width, height] = half(view);
-    let aside = (2.0 * x - 1.0) * width * right + (1.0 - 2.0 * y) * height * up;
-    match view.is_orthographic() {
-        true => Ray::new(view.position + aside, forward),
-        false => Ray::new(view.position, aside + forward),
-    }
+    let [near, far] = [0.0, 1.0].map(|depth| view.world_from_depth(Vec2::new(x, y), depth));
+    Ray::new(near, far - near)
 }
 
 /// A layer that is 1 where the picture shows an added object.
 pub(super) fn layer(scene: &Scene, view: &View) -> Layer {
-    let nodes = scene.before_added().nodes.len();
+    let nodes = scene.added.map_or(usize::MAX, |counts| counts.nodes);
     let bvh = Bvh::build(scene, &Pose::rest(scene));
     let [width, height] = view.extent;
     let shows = |x: u32, y: u32| {
@@ -99,6 +87,6 @@ pub(super) fn layer(scene: &Scene, view: &View) -> Layer {
         hit.is_some_and(|hit| bvh.id(hit.triangle).node as usize >= nodes)
     };
     let data = (0..height).flat_map(|y| (0..width).map(move |x| (x, y)));
-    let data: Vec<[f32; 3]> = data.map(|(x, y)| [if shows(x, y) { 1.0 } else { 0.0 }; 3]).collect();
-    Layer::rgb("object", &data)
+    let data = data.map(|(x, y)| if shows(x, y) { 1.0 } else { 0.0 }).collect();
+    Layer::new("object", &["Y"], data)
 }
