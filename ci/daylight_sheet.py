@@ -1,4 +1,4 @@
-"""Joins the pictures of the experiment `daylight-kinds`: daylight_sheet.py LUCERNA FOLDER. Needs no other packages."""
+"""Joins the pictures of an experiment like `daylight-kinds`: daylight_sheet.py LUCERNA FOLDER. Needs no other packages."""
 
 import array
 import json

@@ -13,7 +13,7 @@ use lucerna::{
 };
 
 /// Suns along a half circle: more times than one and two words of a mask have.
-fn day(scene: &Scene, eye: &View, settings: Baking) -> Plan {
+pub fn day(scene: &Scene, eye: &View, settings: Baking) -> Plan {
     let sun = |i: usize| {
         let angle = (i as f32 + 0.5) / 70.0 * std::f32::consts::PI;
         vec3(angle.cos(), angle.sin(), 0.4).normalize().to_array()

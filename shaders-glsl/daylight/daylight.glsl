@@ -11,6 +11,8 @@ const uint SKY_PATCHES = 146u; // export
 const uint DAY_DIFFUSE_ONLY = 1u; // export
 // Receivers have the detail of normal maps. Texels of lightmaps are larger than that detail.
 const uint DAY_NORMAL_MAPS = 2u; // export
+// Sun masks say from where the sun is seen, instead of a shadow ray from each vertex.
+const uint DAY_SUN_MASKS = 4u; // export
 
 struct DaySettings {
     uint receivers;
@@ -27,7 +29,16 @@ struct DaySettings {
     uint groups;          // of lamps
     float sun_radius;     // tangent of the angular radius of the sun's disc
     float touching;       // surfaces that are nearer to a texel of a lightmap, metres, lie on it; 0: no lightmap
-    uint mask_words;      // of 32 times each for a side of a cell of the sun masks; 0: there are no masks
+    uint words;           // of 32 times each, with a bit for each time at which the sun is seen
+    uint sight_places;    // paths, or points of masks, of each invocation that sends rays to the sun
+};
+
+// The sun at a time of the day.
+struct DaySun {
+    vec3 toward;    // unit vector towards it; for a sun that is a point, its place
+    float squared;  // 0: it is at infinity; for a sun that is a point, the square of the distance at which it has 1 W/m²
+    vec3 right;     // the axes of its disc, unit
+    vec3 up;
 };
 
 // A surface point of a path that reflects direct light.
@@ -48,17 +59,16 @@ struct DayCells {
     float foot;   // of the height on the longest side, as a share of that side
 };
 
-// Times of a group of invocations that add the light of the sun: those of a word of the masks.
-const uint DAY_TIMES = 32u;
+// Times of a word, and of a group of invocations that add the light of the sun.
+const uint DAY_TIMES = 32u; // export
 
-// Invocations of a group that chooses points, and most groups of a row of those that trace their rays.
+// Invocations of a group that chooses points of masks, and of a group that sends their rays.
 const uint DAY_MASK_GROUP = 64u;
-const uint DAY_MASK_ROW = 32768u;
 
 // The masks that the paths of a batch request.
 struct DayRequests {
     uvec3 point_groups;  // that choose the points
-    uvec3 ray_groups;    // points of a row, 1, rows
+    uvec3 ray_groups;    // that send their rays to the sun
     uint count;          // of sides of cells
 };
 

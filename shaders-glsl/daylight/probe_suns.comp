@@ -4,16 +4,14 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/scene.glsl"
 #include "lib/random.glsl"
-#include "lib/material.glsl"
 #include "lib/sampling.glsl"
-#include "lib/trace.glsl"
 #include "daylight/daylight.glsl"
 #include "daylight/probe.glsl"
 
 layout(local_size_x = DAY_TIMES) in;
 
 layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
-layout(binding = 1, scalar) readonly buffer Suns { vec4 suns[]; };      // as in daylight/sun.glsl
+layout(binding = 1, scalar) readonly buffer Suns { DaySun suns[]; };
 layout(binding = 8, scalar) readonly buffer Starts { DayStart starts[]; };
 layout(binding = 9, scalar) readonly buffer Vertices { DayVertex vertices[]; };
 layout(binding = 11, scalar) readonly buffer Counts { uint counts[]; };
@@ -21,10 +19,11 @@ layout(binding = 11, scalar) readonly buffer Counts { uint counts[]; };
 // each probe.
 layout(binding = 12, scalar) buffer Sums { vec3 sums[]; };
 
-// A bit for each side of a cell and each time: whether the sun is seen from there.
+// A bit for each time: whether the sun is seen. For each vertex of the paths, or for each side of a cell of the sun masks.
 layout(binding = 15, scalar) readonly buffer Bits { uint bits[]; };
 
 #include "daylight/sun_ray.glsl"
+#include "daylight/sun_roulette.glsl"
 #include "daylight/sun.glsl"
 
 layout(push_constant, scalar) uniform Push {
@@ -36,12 +35,11 @@ void main() {
     uint time = gl_GlobalInvocationID.x;
     uint receiver = gl_WorkGroupID.y;
     if (time >= settings.times) return;
-    vec4 sun = suns[time];
-    mat3 around = sun_frame(sun);
+    DaySun sun = suns[time];
     for (uint i = first; i < first + count; ++i) {
         uint path = receiver * settings.samples + i;
         uint number = settings.first_sample + i;
-        vec3 light = day_sun(path, settings.first_receiver + receiver, number, time, sun, around);
+        vec3 light = day_sun(path, settings.first_receiver + receiver, number, time, sun);
         if (light == vec3(0.0)) continue;
         float terms[PROBE_TERMS] = probe_harmonics(starts[path].direction);
         uint at = PROBE_TERMS * (2u * (receiver * settings.times + time) + (number & 1u));

@@ -1,30 +1,27 @@
-// Light of the sun at all times of the day: a shadow ray from each vertex to each position of the sun, or the bit of a mask. Invocations side by
-// side have the same vertex and neighbouring times, so that their rays stay together.
+// Light of the sun at all times of the day at the vertices that see it.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
 #extension GL_GOOGLE_include_directive : require
 #include "lib/scene.glsl"
 #include "lib/random.glsl"
-#include "lib/material.glsl"
 #include "lib/sampling.glsl"
-#include "lib/trace.glsl"
 #include "daylight/daylight.glsl"
 
 layout(local_size_x = DAY_TIMES) in;
 
 layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
-// Unit vector towards the sun and 0, or the place of a sun that is a point, and its squared distance from the centre of its path.
-layout(binding = 1, scalar) readonly buffer Suns { vec4 suns[]; };
+layout(binding = 1, scalar) readonly buffer Suns { DaySun suns[]; };
 layout(binding = 9, scalar) readonly buffer Vertices { DayVertex vertices[]; };
 layout(binding = 11, scalar) readonly buffer Counts { uint counts[]; };
 // Sums of irradiance for a sun of 1 W/m² at normal incidence: time after time for each receiver. Odd and even samples apart: their difference
 // shows the noise.
 layout(binding = 12, scalar) buffer Sums { vec3 sums[]; };
 
-// A bit for each side of a cell and each time: whether the sun is seen from there.
+// A bit for each time: whether the sun is seen. For each vertex of the paths, or for each side of a cell of the sun masks.
 layout(binding = 15, scalar) readonly buffer Bits { uint bits[]; };
 
 #include "daylight/sun_ray.glsl"
+#include "daylight/sun_roulette.glsl"
 #include "daylight/sun.glsl"
 
 layout(push_constant, scalar) uniform Push {
@@ -36,13 +33,12 @@ void main() {
     uint time = gl_GlobalInvocationID.x;
     uint receiver = gl_WorkGroupID.y;
     if (time >= settings.times) return;
-    vec4 sun = suns[time];
-    mat3 around = sun_frame(sun);
+    DaySun sun = suns[time];
     vec3 odd = vec3(0.0), even = vec3(0.0);
     for (uint i = first; i < first + count; ++i) {
         uint path = receiver * settings.samples + i;
         uint number = settings.first_sample + i;
-        vec3 of_path = day_sun(path, settings.first_receiver + receiver, number, time, sun, around);
+        vec3 of_path = day_sun(path, settings.first_receiver + receiver, number, time, sun);
         if ((number & 1u) != 0u) odd += of_path;
         else even += of_path;
     }

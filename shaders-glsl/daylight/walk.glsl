@@ -47,8 +47,7 @@ void request_mask(uint side) {
     uint at = atomicAdd(requests.count, 1u);
     wanted[at] = side;
     atomicMax(requests.point_groups.x, at / DAY_MASK_GROUP + 1u);
-    atomicMax(requests.ray_groups.x, min(at + 1u, DAY_MASK_ROW));
-    atomicMax(requests.ray_groups.z, at / DAY_MASK_ROW + 1u);
+    atomicMax(requests.ray_groups.x, at / (DAY_MASK_GROUP * settings.sight_places) + 1u);
 }
 
 void main() {
@@ -138,7 +137,7 @@ void main() {
             float largest = brightest(weight) / SAMPLING_PI;
             if (count == 0u) first_largest = largest;
             uint side = 0u;
-            if (settings.mask_words != 0u) {
+            if ((settings.flags & DAY_SUN_MASKS) != 0u) {
                 side = 2u * day_cell(hit.instance, hit.triangle, hit.barycentrics) + (s.front ? 0u : 1u);
                 request_mask(side);
             }

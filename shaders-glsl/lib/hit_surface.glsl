@@ -20,16 +20,28 @@ struct SurfacePoint {
     vec3 weights;   // of the vertices
 };
 
-SurfacePoint surface_point(uint instance, uint triangle, vec2 barycentrics) {
-    SurfacePoint p;
+// Numbers of a triangle's vertices in its primitive.
+uvec3 surface_vertices(uint instance, uint triangle) {
     uint first = INSTANCE_AT(instance).first_index + 3u * triangle;
-    p.vertices = uvec3(INDEX_AT(first), INDEX_AT(first + 1u), INDEX_AT(first + 2u));
-    p.weights = vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
+    return uvec3(INDEX_AT(first), INDEX_AT(first + 1u), INDEX_AT(first + 2u));
+}
+
+// World positions of the vertices, metres.
+vec3[3] surface_corners(uint instance, uvec3 vertices) {
     mat4 m = INSTANCE_AT(instance).world_from_object;
     uint at = INSTANCE_AT(instance).first_vertex;
-    vec3 a = (m * vec4(POSITION_AT(at + p.vertices.x), 1.0)).xyz;
-    vec3 b = (m * vec4(POSITION_AT(at + p.vertices.y), 1.0)).xyz;
-    vec3 c = (m * vec4(POSITION_AT(at + p.vertices.z), 1.0)).xyz;
+    vec3 a = (m * vec4(POSITION_AT(at + vertices.x), 1.0)).xyz;
+    vec3 b = (m * vec4(POSITION_AT(at + vertices.y), 1.0)).xyz;
+    vec3 c = (m * vec4(POSITION_AT(at + vertices.z), 1.0)).xyz;
+    return vec3[](a, b, c);
+}
+
+SurfacePoint surface_point(uint instance, uint triangle, vec2 barycentrics) {
+    SurfacePoint p;
+    p.vertices = surface_vertices(instance, triangle);
+    p.weights = vec3(1.0 - barycentrics.x - barycentrics.y, barycentrics);
+    vec3 corners[3] = surface_corners(instance, p.vertices);
+    vec3 a = corners[0], b = corners[1], c = corners[2];
     p.position = p.weights.x * a + p.weights.y * b + p.weights.z * c;
     p.area = cross(b - a, c - a);
     if ((INSTANCE_AT(instance).flags & INSTANCE_FLIPPED) != 0u) p.area = -p.area;

@@ -48,4 +48,26 @@ Hit trace(Ray ray, uint mask, uint salt, bool any) {
     return hit;
 }
 
+// A ray on its way. The driver traces it in one step.
+struct Traversal {
+    Ray ray;
+    uint mask;
+    uint salt;
+    Hit hit;
+    bool done;
+};
+
+Traversal trace_begin(Ray ray, uint mask, uint salt) {
+    return Traversal(ray, mask, salt, Hit(ray.t_max, vec2(0.0), NONE, NONE), false);
+}
+
+void trace_step(inout Traversal t, bool any) {
+    t.hit = trace(t.ray, t.mask, t.salt, any);
+    t.done = true;
+}
+
+Hit trace_end(Traversal t) {
+    return t.hit;
+}
+
 #endif

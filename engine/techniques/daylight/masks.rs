@@ -6,7 +6,11 @@ use std::mem::offset_of;
 
 use glam::Vec3;
 
-use super::{Baking, Plan, Transport, lightmap::placed};
+use super::{
+    Baking, Plan, Transport,
+    lightmap::placed,
+    suns::{Sights, words},
+};
 use crate::{
     Error, Result,
     gpu::{BufferDesc, Gpu, OwnedBuffer},
@@ -81,10 +85,6 @@ impl Cells {
 /// A bit for each side and time, in whole words.
 fn bytes_of_cell(times: usize) -> u64 {
     8 * u64::from(words(times))
-}
-
-fn words(times: usize) -> u32 {
-    (times as u32).div_ceil(32)
 }
 
 /// Rounded up to two digits.
@@ -196,6 +196,13 @@ pub(super) struct Handles {
     words: u32,
 }
 
+impl Handles {
+    /// Whether masks say from where the sun is seen.
+    pub fn wanted(self) -> bool {
+        self.words > 0
+    }
+}
+
 impl Masks {
     /// For exact shadow rays: the passes of both ways have the same buffers.
     pub fn none(gpu: &Gpu) -> Result<Self> {
@@ -230,7 +237,7 @@ impl Masks {
     }
 
     /// The buffers for a graph whose paths have at most `vertices` vertices. `words`: [`Transport::mask_words`].
-    pub fn frame(&self, graph: &mut Graph, vertices: u64, words: u32) -> Handles {
+    pub fn frame(&self, graph: &mut Graph, vertices: u64, words: u32, sights: Sights) -> Handles {
         let [cells, cell_firsts, bits, known] =
             [&self.cells, &self.firsts, &self.bits, &self.known].map(|buffer| graph.import_buffer(buffer));
         if self.dirty {
@@ -239,20 +246,20 @@ impl Masks {
         }
         let most = vertices.min(2 * u64::from(self.count)).max(1);
         let wanted = graph.buffer("daylight.wanted-masks", 4 * most);
-        let requests = types::DayRequests { point_groups: [0, 1, 1], ray_groups: [0, 1, 1], count: 0 };
+        let requests = types::DayRequests { point_groups: [0, 1, 1], ray_groups: [0, sights.rows(words), 1], count: 0 };
         let requests = graph.buffer_from("daylight.requests", &[requests]);
         Handles { cells, cell_firsts, bits, known, wanted, requests, most, words }
     }
 
     /// The passes that compute the masks that the paths of the pass before requested; none without masks. `paths`: their number and their
-    /// maximum number of vertices.
+    /// maximum number of vertices; `places`: [`Sights::places`].
     pub fn compute(
         &self,
         graph: &mut Graph,
-        (settings, suns): (Uniform<types::DaySettings>, Buffer),
+        (settings, suns, times): (Uniform<types::DaySettings>, Buffer, u32),
         (handles, rays): (&resident::Handles, RayHandles),
         masks: Handles,
-        (paths, most_turns): ([u64; 2], u64),
+        ((paths, most_turns), places): (([u64; 2], u64), u32),
     ) {
         let Handles { cells, cell_firsts, bits, wanted, requests, most, words, .. } = masks;
         if words == 0 {
@@ -269,10 +276,9 @@ impl Masks {
             handles
         );
         graph.compute_indirect(args, requests, offset_of!(types::DayRequests, point_groups) as u64).rays(vertices);
-        let push = sun_masks::Push { first: 0, count: 1 };
-        let args = traced!(sun_masks::Args { settings, suns, mask_points, requests, bits, push }, rays);
-        // The shader has groups of 64 times.
-        let items = Items::new(words.div_ceil(2)).rays(32 * vertices).turns(most_turns);
+        let push = sun_masks::Push { first: 0, count: times };
+        let args = traced!(sun_masks::Args { settings, suns, mask_points, requests, bits, push }, rays, handles);
+        let items = Items::new(times).rays(vertices).turns(u64::from(places) * (most_turns + 4));
         graph.compute_indirect_over(args, (requests, offset_of!(types::DayRequests, ray_groups) as u64), items);
     }
 }

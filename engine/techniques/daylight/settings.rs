@@ -47,7 +47,7 @@ pub struct Baking {
     /// The sun is a disc of its true size. If off, the sun is a point, as in the paper.
     pub disc: bool,
     /// Distance between points on surfaces at which the visibility of the sun is computed once for all paths and used for the light that surfaces
-    /// reflect; 0: each vertex of each path sends a shadow ray to each position of the sun. Masks are much faster for large bakes. Shadows in the
+    /// reflect; 0: each vertex of each path sends a shadow ray to each position of the sun. Masks are faster for large bakes. Shadows in the
     /// reflected light are then as coarse as this distance.
     #[schemars(range(min = 0.001, max = 1000), extend("x-zero" = true, "x-unit" = "m"))]
     pub sun_masks: f32,

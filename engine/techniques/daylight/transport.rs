@@ -1,9 +1,9 @@
 //! The light of a tile for all times of the day, by paths that all times share (`shaders-glsl/daylight`).
 //!
 //! A path starts at a texel and ends in the sky or after some scatterings. Its vertices do not depend on the time, so each vertex sends one
-//! shadow ray to each position of the sun, or reads its visibility from a mask ([`super::masks`]). A day costs one set of paths and many coherent
+//! shadow ray to each position of the sun, or reads its visibility from a mask ([`super::masks`]). A day costs one set of paths and many
 //! shadow rays, instead of a set of paths for each time. Russian roulette decides whether the shadow rays of late vertices, and of surfaces
-//! that the sun grazes, are sent.
+//! that the sun grazes, are sent. Where the triangle that hid the sun at one time hides it at the next time too, no ray is sent.
 //! Light is linear in the sun, so the sun is white and has an irradiance of 1 W/m² at normal incidence.
 
 use super::{
@@ -13,7 +13,7 @@ use super::{
     gathered::Spot,
     light::{Light, is_buried, summed},
     masks::Masks,
-    suns::{sun_items, suns_of},
+    suns::{Paths, Sights, sun_items, suns_of, words},
 };
 use glam::Vec3;
 
@@ -46,6 +46,8 @@ pub(super) const LAMP_TURNS: u64 = 64;
 const SPARSE: usize = 2048;
 /// Vertices of a batch at most: 117 MB, because every device allows buffers of 128 MiB.
 const MOST_VERTICES: u64 = 1 << 21;
+/// Words of all vertices of a batch, with a bit for each time, at most: 128 MiB.
+const MOST_WORDS: u64 = 1 << 25;
 
 /// The scene of a bake on a device.
 #[derive(Debug)]
@@ -58,6 +60,7 @@ pub struct Transport {
     pub(super) rays: Rays,
     pub(super) suns: OwnedBuffer,
     pub(super) masks: Masks,
+    pub(super) sights: Sights,
     /// The lamps that are sampled, made for the first tile.
     pub(super) lamps: Option<LightTable>,
     /// The group of each light, and of each material.
@@ -89,6 +92,7 @@ impl Transport {
         let rays = Rays::new(gpu, &scene, &resident)?;
         let suns = suns_of(gpu, plan)?;
         let masks = Masks::none(gpu)?;
+        let sights = Sights::of(gpu)?;
         Ok(Self {
             gpu: gpu.clone(),
             runner: Runner::new(gpu),
@@ -98,10 +102,17 @@ impl Transport {
             rays,
             suns,
             masks,
+            sights,
             lamps: None,
             groups,
             sources,
         })
+    }
+
+    /// Cuts long passes into dispatches of about so many rays. The light stays the same but for rounding.
+    #[must_use]
+    pub fn dispatch_rays(self, rays: u64) -> Self {
+        Self { runner: Runner::new(&self.gpu).dispatch_rays(rays), ..self }
     }
 
     /// The light of a tile. Its bits do not depend on the other tiles.
@@ -179,13 +190,15 @@ impl Transport {
         let adaptive = plan.settings.adaptive != Adaptive::Off;
         let texels = texels.max(if adaptive { SPARSE as u64 } else { 1 });
         let vertices = u64::from(consts::DAY_VERTICES);
-        let paths = batch(texels) * texels;
+        // The choice of the steps has no masks.
+        let masks = plan.settings.sun_masks > 0.0;
+        let words = if masks && !adaptive { 0 } else { words(plan.times.len()) };
+        let paths = batch(texels, words) * texels;
         let of_path = vertices * size_of::<types::DayVertex>() as u64 + size_of::<types::DayEscape>() as u64 + 4;
         // Sums are on the device and in the buffer that the host reads.
         let sums: u64 = plan.dimensions().iter().map(|count| 2 * 24 * *count as u64).sum();
-        let masks =
-            if plan.settings.sun_masks > 0.0 { vertices * (4 + size_of::<types::DayMaskPoint>() as u64) } else { 0 };
-        paths * (of_path + masks)
+        let of_masks = if masks { vertices * (4 + size_of::<types::DayMaskPoint>() as u64) } else { 0 };
+        paths * (of_path + of_masks + 4 * vertices * u64::from(words))
             + texels * (sums + size_of::<types::Hit>() as u64 + size_of::<types::DaySpot>() as u64 + 4)
     }
 
@@ -260,7 +273,8 @@ impl Transport {
         }
         let times = plan.times.len() as u32;
         let mask_words = self.mask_words(plan)?;
-        let batch = batch(count.into()) as u32;
+        let sight_words = if mask_words == 0 { words(plan.times.len()) } else { 0 };
+        let batch = batch(count.into(), sight_words) as u32;
         let buffer = |name, bytes: u64| OwnedBuffer::new(&self.gpu, name, BufferDesc::device(bytes.max(16)));
         let paths = u64::from(count * batch);
         let receivers = OwnedBuffer::with_contents(&self.gpu, "daylight.receivers", bytemuck::cast_slice(hits))?;
@@ -291,7 +305,7 @@ impl Transport {
             let sun_sums = graph.import_buffer(&sun_sums);
             let sky_sums = graph.import_buffer(&sky_sums);
             let lamp_sums = graph.import_buffer(&lamp_sums);
-            let masks = self.masks.frame(&mut graph, paths * u64::from(consts::DAY_VERTICES), mask_words);
+            let masks = self.masks.frame(&mut graph, paths * u64::from(consts::DAY_VERTICES), mask_words, self.sights);
             if first_sample == 0 {
                 graph.fill(sun_sums, 0);
                 graph.fill(sky_sums, 0);
@@ -300,7 +314,12 @@ impl Transport {
             }
             let spots = graph.buffer("daylight.spots", u64::from(count) * size_of::<types::DaySpot>() as u64);
             let of_lights = handles.moment.lights.len() as u32;
-            let settings = graph.uniform(&settings(plan, first, [count, now, first_sample], [of_lights, mask_words]));
+            let settings = graph.uniform(&settings(
+                plan,
+                first,
+                [count, now, first_sample],
+                (of_lights, masks.wanted(), self.sights),
+            ));
             let args = traced!(
                 walk::Args {
                     settings,
@@ -324,22 +343,11 @@ impl Transport {
             graph.compute(args, paths).rays(u64::from(paths) * bounces);
             if times > 0 {
                 let suns = graph.import_buffer(&self.suns);
-                let most = ([paths.into(), bounces], most_turns);
-                self.masks.compute(&mut graph, (settings, suns), (&handles, rays), masks, most);
-                let args = traced!(
-                    suns::Args {
-                        settings,
-                        suns,
-                        vertices,
-                        counts,
-                        sums: sun_sums,
-                        bits: masks.bits,
-                        spec: suns::Spec { masks: u32::from(mask_words > 0) },
-                        push: suns::Push { first: 0, count: now },
-                    },
-                    rays
-                );
-                let items = sun_items([count, times, now], bounces, mask_words, most_turns);
+                let all = Paths { settings, vertices, counts, number: [count, now], bounces };
+                let bits = self.sights(&mut graph, (all, suns, times), (&handles, rays), masks);
+                let push = suns::Push { first: 0, count: now };
+                let args = suns::Args { settings, suns, vertices, counts, sums: sun_sums, bits, push };
+                let items = sun_items([count, times, now], bounces);
                 graph.compute_over(args, [times, count], items);
             }
             if groups > 0 {
@@ -395,9 +403,10 @@ impl Transport {
     }
 }
 
-/// Paths of a texel in one batch, of a tile with so many texels.
-fn batch(texels: u64) -> u64 {
-    (MOST_VERTICES / (texels * u64::from(consts::DAY_VERTICES))).clamp(1, BATCH.into())
+/// Paths of a texel in one batch, of a tile with so many texels. `words`: of the bits of a vertex, 0 with masks.
+fn batch(texels: u64, words: u32) -> u64 {
+    let vertices = MOST_VERTICES.min(MOST_WORDS / u64::from(words.max(1)));
+    (vertices / (texels * u64::from(consts::DAY_VERTICES))).clamp(1, BATCH.into())
 }
 
 /// The lamps as they are sampled, made once.
@@ -434,7 +443,7 @@ pub(super) fn settings(
     plan: &Plan,
     first_receiver: u32,
     [receivers, samples, first_sample]: [u32; 3],
-    [lights, mask_words]: [u32; 2],
+    (lights, masks, sights): (u32, bool, Sights),
 ) -> types::DaySettings {
     let baking = &plan.settings;
     let mut flags = 0;
@@ -445,6 +454,9 @@ pub(super) fn settings(
         Kind::Lightmap { .. } => TOUCHING / baking.density,
         _ => 0.0,
     };
+    if masks {
+        flags |= consts::DAY_SUN_MASKS;
+    }
     if baking.diffuse_only {
         flags |= consts::DAY_DIFFUSE_ONLY;
     }
@@ -463,6 +475,7 @@ pub(super) fn settings(
         groups: plan.lamps.len() as u32,
         sun_radius: if baking.disc { SUN_ANGULAR_RADIUS.tan() as f32 } else { 0.0 },
         touching,
-        mask_words,
+        words: words(plan.times.len()),
+        sight_places: sights.places,
     }
 }

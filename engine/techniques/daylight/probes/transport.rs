@@ -20,7 +20,7 @@ use crate::{
     techniques::daylight::{
         Plan, Transport,
         light::Light,
-        suns::sun_items,
+        suns::{Paths, sun_items},
         transport::{LAMP_TURNS, lamp_table, settings},
     },
 };
@@ -141,11 +141,13 @@ impl Transport {
         let escapes = graph.import_buffer(&buffers.escapes);
         let counts = graph.import_buffer(&buffers.counts);
         let lights = handles.moment.lights.len() as u32;
-        let settings = graph.uniform(&settings(plan, first, [count, now, first_sample], [lights, mask_words]));
         let positions: Vec<[f32; 3]> = positions.iter().map(|position| position.to_array()).collect();
         let probes = graph.buffer_from("daylight.probes", &positions);
         let paths = count * now;
-        let masks = self.masks.frame(&mut graph, u64::from(paths) * u64::from(consts::DAY_VERTICES), mask_words);
+        let masks =
+            self.masks.frame(&mut graph, u64::from(paths) * u64::from(consts::DAY_VERTICES), mask_words, self.sights);
+        let settings =
+            graph.uniform(&settings(plan, first, [count, now, first_sample], (lights, masks.wanted(), self.sights)));
         let args = traced!(
             probe_walk::Args {
                 settings,
@@ -175,23 +177,11 @@ impl Transport {
             }
             if times > 0 {
                 let suns = graph.import_buffer(&self.suns);
-                let most = ([paths.into(), bounces], most_turns);
-                self.masks.compute(&mut graph, (settings, suns), (&handles, rays), masks, most);
-                let args = traced!(
-                    probe_suns::Args {
-                        settings,
-                        suns,
-                        starts,
-                        vertices,
-                        counts,
-                        sums: sun,
-                        bits: masks.bits,
-                        spec: probe_suns::Spec { masks: u32::from(mask_words > 0) },
-                        push: probe_suns::Push { first: 0, count: now },
-                    },
-                    rays
-                );
-                let items = sun_items([count, times, now], bounces, mask_words, most_turns);
+                let all = Paths { settings, vertices, counts, number: [count, now], bounces };
+                let bits = self.sights(&mut graph, (all, suns, times), (&handles, rays), masks);
+                let push = probe_suns::Push { first: 0, count: now };
+                let args = probe_suns::Args { settings, suns, starts, vertices, counts, sums: sun, bits, push };
+                let items = sun_items([count, times, now], bounces);
                 graph.compute_over(args, [times, count], items);
             }
             graph.compute(probe_sky::Args { settings, starts, escapes, sums: sky }, count);
