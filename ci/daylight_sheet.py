@@ -1,4 +1,4 @@
-"""Joins the pictures of an experiment like `daylight-kinds`: daylight_sheet.py LUCERNA FOLDER. Needs no other packages."""
+"""Joins the pictures of the experiment `daylight-kinds`: daylight_sheet.py LUCERNA FOLDER. Needs no other packages."""
 
 import array
 import json
@@ -8,7 +8,8 @@ import subprocess
 import sys
 import tempfile
 
-ROWS = ["day", "cube", "lightmap", "day, truth"]
+# Scenes have one of the two lightmaps.
+ROWS = ["day", "cube", "lightmap", "coarse lightmap", "day, truth"]
 # Share of the pixels of the path tracer's picture that are darker than the level that is shown as this grey.
 SHARE, GREY = 0.8, 0.5
 GAP = 2
@@ -38,16 +39,17 @@ def exposed(rows, factor):
 def sheet(lucerna, folder, runs, layer, output, work):
     """One column for each time, one row for each method. The exposure is that of the path tracer's picture of all light."""
     times = sorted({time for _, time in runs})
+    methods = [row for row in ROWS if (row, times[0]) in runs]
     columns = []
     for time in times:
-        truth = pixels(lucerna, runs[ROWS[-1], time], "", work)
+        truth = pixels(lucerna, runs[methods[-1], time], "", work)
         greens = sorted(value for row in truth[2] for value in row[1::3])
         factor = -math.log(1 - GREY) / max(greens[int(SHARE * (len(greens) - 1))], 1e-9)
-        columns.append([exposed(pixels(lucerna, runs[row, time], layer, work)[2], factor) for row in ROWS])
+        columns.append([exposed(pixels(lucerna, runs[row, time], layer, work)[2], factor) for row in methods])
     width, height, _ = truth
     gap = array.array("f", [1.0] * (3 * GAP))
     lines = []
-    for row in range(len(ROWS)):
+    for row in range(len(methods)):
         for y in range(height):
             line = array.array("f")
             for column in columns:
@@ -62,7 +64,7 @@ def sheet(lucerna, folder, runs, layer, output, work):
     pfm.write_bytes(f"PF\n{len(lines[0]) // 3} {len(lines)}\n-1.0\n".encode() + b"".join(line.tobytes() for line in reversed(lines)))
     command = [lucerna, "tonemap", "--operator", "linear", "--overwrite", "--quiet", "--quality", "90", "-o", output, pfm]
     subprocess.run(command, check=True)
-    print(f"wrote {output}: columns {', '.join(times)}; rows {', '.join(ROWS)}")
+    print(f"wrote {output}: columns {', '.join(times)}; rows {', '.join(methods)}")
 
 
 def main():

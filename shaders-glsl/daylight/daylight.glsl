@@ -29,15 +29,14 @@ struct DaySettings {
     uint groups;          // of lamps
     float sun_radius;     // tangent of the angular radius of the sun's disc
     float touching;       // surfaces that are nearer to a texel of a lightmap, metres, lie on it; 0: no lightmap
-    uint words;           // of 32 times each, with a bit for each time at which the sun is seen
-    uint sight_places;    // paths, or points of masks, of each invocation that sends rays to the sun
+    uint places;          // paths, or points of masks, of each invocation that sends rays to the sun
 };
 
 // The sun at a time of the day.
 struct DaySun {
-    vec3 toward;    // unit vector towards it; for a sun that is a point, its place
-    float squared;  // 0: it is at infinity; for a sun that is a point, the square of the distance at which it has 1 W/m²
-    vec3 right;     // the axes of its disc, unit
+    vec3 toward;      // unit vector towards it; for a sun that is a point, its place, metres
+    float intensity;  // radiant intensity of a sun that is a point, W/sr; 0: the sun is at infinity
+    vec3 right;       // axes of its disc, unit
     vec3 up;
 };
 
@@ -62,13 +61,18 @@ struct DayCells {
 // Times of a word, and of a group of invocations that add the light of the sun.
 const uint DAY_TIMES = 32u; // export
 
-// Invocations of a group that chooses points of masks, and of a group that sends their rays.
-const uint DAY_MASK_GROUP = 64u;
+// Invocations of a group that sends rays to the sun, and of one that chooses points of masks.
+const uint DAY_VISIBILITY_GROUP = 64u;
+
+// Words of a place that have a bit for each time.
+uint day_words(DaySettings settings) {
+    return (settings.times + DAY_TIMES - 1u) / DAY_TIMES;
+}
 
 // The masks that the paths of a batch request.
 struct DayRequests {
     uvec3 point_groups;  // that choose the points
-    uvec3 ray_groups;    // that send their rays to the sun
+    uvec3 ray_groups;    // that send rays from the points to the sun
     uint count;          // of sides of cells
 };
 

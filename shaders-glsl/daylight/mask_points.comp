@@ -13,7 +13,7 @@
 #include "lib/trace.glsl"
 #include "daylight/daylight.glsl"
 
-layout(local_size_x = 64) in; // DAY_MASK_GROUP
+layout(local_size_x = DAY_VISIBILITY_GROUP) in;
 
 layout(binding = 0, scalar) uniform SettingsBlock { DaySettings settings; };
 layout(binding = 9, scalar) readonly buffer Wanted { uint wanted[]; };  // as in daylight/walk.glsl

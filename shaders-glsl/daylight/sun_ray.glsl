@@ -12,16 +12,12 @@ vec2 day_sun_disc(uvec2 words, float radius) {
     return radius * sample_disc(unit_floats(words));
 }
 
-// The unit vector from a point to the centre of the sun.
-vec3 toward_sun(vec3 from, DaySun sun) {
-    return sun.squared > 0.0 ? normalize(sun.toward - from) : sun.toward;
-}
-
+// The ray from a point to a place on the disc of the sun. `disc`: in tangents of the angle from the centre of the sun; a sun that is a point has no disc.
 DaySunRay day_sun_ray(vec3 from, DaySun sun, vec2 disc) {
-    if (sun.squared > 0.0) {
+    if (sun.intensity > 0.0) {
         vec3 way = sun.toward - from;
         float far = length(way);
-        return DaySunRay(way / far, far, sun.squared / (far * far));
+        return DaySunRay(way / far, far, sun.intensity / (far * far));
     }
     return DaySunRay(normalize(sun.toward + sun.right * disc.x + sun.up * disc.y), 1e30, 1.0);
 }

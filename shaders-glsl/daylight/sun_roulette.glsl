@@ -20,7 +20,7 @@ DaySunChoice sun_choice(uint of_bake, uint number, uint k) {
 // The probability with which a vertex sends a ray. It follows the centre of the sun, and it is above 0 for each place of the disc that is before the
 // surface.
 float sun_stay(DayVertex vertex, DaySun sun) {
-    vec3 toward = toward_sun(vertex.position, sun);
+    vec3 toward = day_sun_ray(vertex.position, sun, vec2(0.0)).direction;
     float cosine = dot(vertex.normal, toward) + settings.sun_radius;
     if (dot(vertex.geometric, toward) + settings.sun_radius <= 0.0) return 0.0;
     return min(vertex.share * cosine / SHADOW_ROULETTE, 1.0);

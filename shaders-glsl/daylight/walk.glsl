@@ -46,8 +46,8 @@ void request_mask(uint side) {
     if ((known[side >> 5u] & bit) != 0u || (atomicOr(known[side >> 5u], bit) & bit) != 0u) return;
     uint at = atomicAdd(requests.count, 1u);
     wanted[at] = side;
-    atomicMax(requests.point_groups.x, at / DAY_MASK_GROUP + 1u);
-    atomicMax(requests.ray_groups.x, at / (DAY_MASK_GROUP * settings.sight_places) + 1u);
+    atomicMax(requests.point_groups.x, at / DAY_VISIBILITY_GROUP + 1u);
+    atomicMax(requests.ray_groups.x, at / (DAY_VISIBILITY_GROUP * settings.places) + 1u);
 }
 
 void main() {

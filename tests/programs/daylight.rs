@@ -29,9 +29,9 @@ mod daylight_masks;
 mod daylight_probes;
 #[path = "../daylight_sequence.rs"]
 mod daylight_sequence;
-#[path = "../daylight_sights.rs"]
-mod daylight_sights;
 #[path = "../daylight_sky.rs"]
 mod daylight_sky;
 #[path = "../daylight_sun.rs"]
 mod daylight_sun;
+#[path = "../daylight_visibility.rs"]
+mod daylight_visibility;

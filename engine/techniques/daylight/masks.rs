@@ -9,12 +9,12 @@ use glam::Vec3;
 use super::{
     Baking, Plan, Transport,
     lightmap::placed,
-    suns::{Sights, words},
+    suns::{Paths, Share, times_of, words},
 };
 use crate::{
     Error, Result,
     gpu::{BufferDesc, Gpu, OwnedBuffer},
-    graph::{Buffer, Graph, Items, Uniform},
+    graph::{Buffer, Graph},
     rays::{RayHandles, traced},
     resident,
     scene::{Pose, Scene},
@@ -237,7 +237,7 @@ impl Masks {
     }
 
     /// The buffers for a graph whose paths have at most `vertices` vertices. `words`: [`Transport::mask_words`].
-    pub fn frame(&self, graph: &mut Graph, vertices: u64, words: u32, sights: Sights) -> Handles {
+    pub fn frame(&self, graph: &mut Graph, vertices: u64, words: u32, share: Share) -> Handles {
         let [cells, cell_firsts, bits, known] =
             [&self.cells, &self.firsts, &self.bits, &self.known].map(|buffer| graph.import_buffer(buffer));
         if self.dirty {
@@ -246,27 +246,25 @@ impl Masks {
         }
         let most = vertices.min(2 * u64::from(self.count)).max(1);
         let wanted = graph.buffer("daylight.wanted-masks", 4 * most);
-        let requests = types::DayRequests { point_groups: [0, 1, 1], ray_groups: [0, sights.rows(words), 1], count: 0 };
+        let requests = types::DayRequests { point_groups: [0, 1, 1], ray_groups: [0, share.rows(words), 1], count: 0 };
         let requests = graph.buffer_from("daylight.requests", &[requests]);
         Handles { cells, cell_firsts, bits, known, wanted, requests, most, words }
     }
 
-    /// The passes that compute the masks that the paths of the pass before requested; none without masks. `paths`: their number and their
-    /// maximum number of vertices; `places`: [`Sights::places`].
+    /// The passes that compute the masks that the paths of the pass before requested.
     pub fn compute(
         &self,
         graph: &mut Graph,
-        (settings, suns, times): (Uniform<types::DaySettings>, Buffer, u32),
+        paths: Paths,
+        (suns, times): (Buffer, u32),
         (handles, rays): (&resident::Handles, RayHandles),
         masks: Handles,
-        ((paths, most_turns), places): (([u64; 2], u64), u32),
+        most_turns: u64,
     ) {
-        let Handles { cells, cell_firsts, bits, wanted, requests, most, words, .. } = masks;
-        if words == 0 {
-            return;
-        }
+        let Handles { cells, cell_firsts, bits, wanted, requests, most, .. } = masks;
+        let settings = paths.settings;
         // About half of all vertices are there.
-        let vertices = paths[0] * paths[1].div_ceil(2);
+        let points = (u64::from(paths.count()) * paths.bounces.div_ceil(2)).min(most);
         let mask_points = graph.buffer("daylight.mask-points", most * size_of::<types::DayMaskPoint>() as u64);
         let (triangles, instances) = (self.triangles, self.instances);
         let push = mask_points::Push { triangles, instances, spacing: self.spacing };
@@ -275,10 +273,10 @@ impl Masks {
             rays,
             handles
         );
-        graph.compute_indirect(args, requests, offset_of!(types::DayRequests, point_groups) as u64).rays(vertices);
+        graph.compute_indirect(args, requests, offset_of!(types::DayRequests, point_groups) as u64).rays(points);
         let push = sun_masks::Push { first: 0, count: times };
         let args = traced!(sun_masks::Args { settings, suns, mask_points, requests, bits, push }, rays, handles);
-        let items = Items::new(times).rays(vertices).turns(u64::from(places) * (most_turns + 4));
+        let items = times_of(times, points, 1, most_turns);
         graph.compute_indirect_over(args, (requests, offset_of!(types::DayRequests, ray_groups) as u64), items);
     }
 }

@@ -12,8 +12,8 @@ use super::{
     beam::SUN_ANGULAR_RADIUS,
     gathered::Spot,
     light::{Light, is_buried, summed},
-    masks::Masks,
-    suns::{Paths, Sights, sun_items, suns_of, words},
+    masks::{self, Masks},
+    suns::{Paths, Share, sun_items, suns_of, words},
 };
 use glam::Vec3;
 
@@ -60,7 +60,7 @@ pub struct Transport {
     pub(super) rays: Rays,
     pub(super) suns: OwnedBuffer,
     pub(super) masks: Masks,
-    pub(super) sights: Sights,
+    pub(super) share: Share,
     /// The lamps that are sampled, made for the first tile.
     pub(super) lamps: Option<LightTable>,
     /// The group of each light, and of each material.
@@ -92,7 +92,7 @@ impl Transport {
         let rays = Rays::new(gpu, &scene, &resident)?;
         let suns = suns_of(gpu, plan)?;
         let masks = Masks::none(gpu)?;
-        let sights = Sights::of(gpu)?;
+        let share = Share::of(gpu)?;
         Ok(Self {
             gpu: gpu.clone(),
             runner: Runner::new(gpu),
@@ -102,17 +102,17 @@ impl Transport {
             rays,
             suns,
             masks,
-            sights,
+            share,
             lamps: None,
             groups,
             sources,
         })
     }
 
-    /// Cuts long passes into dispatches of about so many rays. The light stays the same but for rounding.
+    /// Cuts long passes into dispatches of about so many rays ([`Runner::dispatch_rays`]). The light stays the same but for rounding.
     #[must_use]
     pub fn dispatch_rays(self, rays: u64) -> Self {
-        Self { runner: Runner::new(&self.gpu).dispatch_rays(rays), ..self }
+        Self { runner: self.runner.dispatch_rays(rays), ..self }
     }
 
     /// The light of a tile. Its bits do not depend on the other tiles.
@@ -273,8 +273,8 @@ impl Transport {
         }
         let times = plan.times.len() as u32;
         let mask_words = self.mask_words(plan)?;
-        let sight_words = if mask_words == 0 { words(plan.times.len()) } else { 0 };
-        let batch = batch(count.into(), sight_words) as u32;
+        let visibility_words = if mask_words == 0 { words(plan.times.len()) } else { 0 };
+        let batch = batch(count.into(), visibility_words) as u32;
         let buffer = |name, bytes: u64| OwnedBuffer::new(&self.gpu, name, BufferDesc::device(bytes.max(16)));
         let paths = u64::from(count * batch);
         let receivers = OwnedBuffer::with_contents(&self.gpu, "daylight.receivers", bytemuck::cast_slice(hits))?;
@@ -305,7 +305,7 @@ impl Transport {
             let sun_sums = graph.import_buffer(&sun_sums);
             let sky_sums = graph.import_buffer(&sky_sums);
             let lamp_sums = graph.import_buffer(&lamp_sums);
-            let masks = self.masks.frame(&mut graph, paths * u64::from(consts::DAY_VERTICES), mask_words, self.sights);
+            let masks = self.masks.frame(&mut graph, paths * u64::from(consts::DAY_VERTICES), mask_words, self.share);
             if first_sample == 0 {
                 graph.fill(sun_sums, 0);
                 graph.fill(sky_sums, 0);
@@ -314,12 +314,8 @@ impl Transport {
             }
             let spots = graph.buffer("daylight.spots", u64::from(count) * size_of::<types::DaySpot>() as u64);
             let of_lights = handles.moment.lights.len() as u32;
-            let settings = graph.uniform(&settings(
-                plan,
-                first,
-                [count, now, first_sample],
-                (of_lights, masks.wanted(), self.sights),
-            ));
+            let settings =
+                graph.uniform(&settings(plan, first, [count, now, first_sample], (of_lights, self.share, masks)));
             let args = traced!(
                 walk::Args {
                     settings,
@@ -343,8 +339,8 @@ impl Transport {
             graph.compute(args, paths).rays(u64::from(paths) * bounces);
             if times > 0 {
                 let suns = graph.import_buffer(&self.suns);
-                let all = Paths { settings, vertices, counts, number: [count, now], bounces };
-                let bits = self.sights(&mut graph, (all, suns, times), (&handles, rays), masks);
+                let all = Paths { settings, vertices, counts, receivers: count, samples: now, bounces };
+                let bits = self.visibility(&mut graph, all, (suns, times), (&handles, rays), masks);
                 let push = suns::Push { first: 0, count: now };
                 let args = suns::Args { settings, suns, vertices, counts, sums: sun_sums, bits, push };
                 let items = sun_items([count, times, now], bounces);
@@ -403,7 +399,7 @@ impl Transport {
     }
 }
 
-/// Paths of a texel in one batch, of a tile with so many texels. `words`: of the bits of a vertex, 0 with masks.
+/// Paths of a texel in one batch, of a tile with so many texels. `words`: the words with the bits of a vertex, 0 with masks.
 fn batch(texels: u64, words: u32) -> u64 {
     let vertices = MOST_VERTICES.min(MOST_WORDS / u64::from(words.max(1)));
     (vertices / (texels * u64::from(consts::DAY_VERTICES))).clamp(1, BATCH.into())
@@ -443,7 +439,7 @@ pub(super) fn settings(
     plan: &Plan,
     first_receiver: u32,
     [receivers, samples, first_sample]: [u32; 3],
-    (lights, masks, sights): (u32, bool, Sights),
+    (lights, share, masks): (u32, Share, masks::Handles),
 ) -> types::DaySettings {
     let baking = &plan.settings;
     let mut flags = 0;
@@ -454,7 +450,7 @@ pub(super) fn settings(
         Kind::Lightmap { .. } => TOUCHING / baking.density,
         _ => 0.0,
     };
-    if masks {
+    if masks.wanted() {
         flags |= consts::DAY_SUN_MASKS;
     }
     if baking.diffuse_only {
@@ -475,7 +471,6 @@ pub(super) fn settings(
         groups: plan.lamps.len() as u32,
         sun_radius: if baking.disc { SUN_ANGULAR_RADIUS.tan() as f32 } else { 0.0 },
         touching,
-        words: words(plan.times.len()),
-        sight_places: sights.places,
+        places: share.places,
     }
 }

@@ -145,9 +145,8 @@ impl Transport {
         let probes = graph.buffer_from("daylight.probes", &positions);
         let paths = count * now;
         let masks =
-            self.masks.frame(&mut graph, u64::from(paths) * u64::from(consts::DAY_VERTICES), mask_words, self.sights);
-        let settings =
-            graph.uniform(&settings(plan, first, [count, now, first_sample], (lights, masks.wanted(), self.sights)));
+            self.masks.frame(&mut graph, u64::from(paths) * u64::from(consts::DAY_VERTICES), mask_words, self.share);
+        let settings = graph.uniform(&settings(plan, first, [count, now, first_sample], (lights, self.share, masks)));
         let args = traced!(
             probe_walk::Args {
                 settings,
@@ -177,8 +176,8 @@ impl Transport {
             }
             if times > 0 {
                 let suns = graph.import_buffer(&self.suns);
-                let all = Paths { settings, vertices, counts, number: [count, now], bounces };
-                let bits = self.sights(&mut graph, (all, suns, times), (&handles, rays), masks);
+                let all = Paths { settings, vertices, counts, receivers: count, samples: now, bounces };
+                let bits = self.visibility(&mut graph, all, (suns, times), (&handles, rays), masks);
                 let push = probe_suns::Push { first: 0, count: now };
                 let args = probe_suns::Args { settings, suns, starts, vertices, counts, sums: sun, bits, push };
                 let items = sun_items([count, times, now], bounces);

@@ -53,7 +53,6 @@ use crate::{
 /// The built-in experiments: name and text.
 pub const BUILTIN: &[(&str, &str)] = &[
     ("daylight", include_str!("../../../experiments/daylight.toml")),
-    ("daylight-halls", include_str!("../../../experiments/daylight-halls.toml")),
     ("daylight-kinds", include_str!("../../../experiments/daylight-kinds.toml")),
     ("fiv", include_str!("../../../experiments/fiv.toml")),
     ("igi", include_str!("../../../experiments/igi.toml")),

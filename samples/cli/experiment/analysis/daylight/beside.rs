@@ -16,10 +16,11 @@ use crate::{
 };
 
 /// Techniques of pictures and their names in tables.
-const DAYS: [(&str, &str); 6] = [
+const DAYS: [(&str, &str); 7] = [
     ("day", "the day of the experiment"),
     ("cube", "the same day, from a cube"),
     ("lightmap", "the same day, from a lightmap"),
+    ("coarse lightmap", "the same day, from a coarse lightmap"),
     ("diffuse", "the same day, diffuse surfaces on both sides"),
     ("overcast", "the same day, overcast"),
     ("winter", "a winter day"),
@@ -57,7 +58,7 @@ pub(super) fn pairs<'a>(results: &'a Results, view: (&'a str, &'a str), name: &s
 
 /// Name of the reference of a technique.
 fn reference_of(name: &str) -> String {
-    let day = if matches!(name, "cube" | "lightmap") { "day" } else { name };
+    let day = if matches!(name, "cube" | "lightmap" | "coarse lightmap") { "day" } else { name };
     format!("{day}, truth")
 }
 

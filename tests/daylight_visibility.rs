@@ -90,6 +90,24 @@ fn dispatches_of_few_rays_have_the_same_light() {
 }
 
 #[test]
+fn the_light_of_a_time_does_not_depend_on_the_other_times() {
+    with_gpu(|gpu| {
+        let (scene, eye) = forest();
+        let sources = Sources::View(Box::new(eye));
+        for sun_masks in [0.0, 0.2] {
+            let [all, _] = days(&scene, &eye, &Baking { samples: 8, sun_masks, ..baking() });
+            // Times of all words, and of none of them the first.
+            let some = [10, 40, 50, 69];
+            let alone = Plan { times: some.map(|time| all.times[time]).to_vec(), ..all.clone() };
+            let [all, alone] = [&all, &alone].map(|plan| sun_of(gpu, &scene, plan, &sources));
+            for (all, alone) in all.chunks_exact(70).zip(alone.chunks_exact(some.len())) {
+                assert_eq!(some.map(|time| all[time]), alone, "masks {sun_masks}");
+            }
+        }
+    });
+}
+
+#[test]
 fn cut_out_triangles_save_no_ray() {
     with_gpu(|gpu| {
         let mut stage = Stage::new();
