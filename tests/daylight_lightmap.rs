@@ -38,7 +38,7 @@ fn planned(scene: &Scene, glowing: u32, settings: Baking) -> (Plan, Unwrapped) {
 
 fn lightmap_of(gpu: &Gpu, scene: &Scene, glowing: u32, settings: Baking) -> Baked {
     let (plan, unwrapped) = planned(scene, glowing, settings);
-    let sources = Sources::Lightmap(unwrapped.by_tile(plan.side()));
+    let sources = Sources::Lightmap(Box::new(unwrapped.by_tile(plan.side())));
     let stored = baked(gpu, scene, plan, sources);
     Baked::new(Stored { corners: unwrapped.lightmap.corners, ..stored })
 }
@@ -46,7 +46,7 @@ fn lightmap_of(gpu: &Gpu, scene: &Scene, glowing: u32, settings: Baking) -> Bake
 /// A lightmap whose lamps have the irradiance `of` a position and a normal.
 fn lightmap_with(gpu: &Gpu, scene: &Scene, glowing: u32, of: impl Fn(Vec3, Vec3) -> f32) -> Baked {
     let (plan, unwrapped) = planned(scene, glowing, Baking { bounces: 1, tolerance: 0.002, ..baking(2) });
-    let sources = Sources::Lightmap(unwrapped.by_tile(plan.side()));
+    let sources = Sources::Lightmap(Box::new(unwrapped.by_tile(plan.side())));
     let skies = units::skies(&plan).unwrap();
     let mut tiles = lights(gpu, scene, &plan, sources);
     for light in &mut tiles {

@@ -24,8 +24,9 @@ layout(binding = 12, scalar) writeonly buffer Starts { DayStart starts[]; };
 // Their t is positive for the front of a triangle and negative for its back.
 layout(binding = 8, scalar) readonly buffer Receivers { Hit receivers[]; };
 layout(binding = 14, scalar) writeonly buffer Spots { DaySpot spots[]; };
-// For each receiver of a lightmap: the paths that begin inside of a solid, or under an object that lies on the surface.
-layout(binding = 20, scalar) buffer Buried { uint buried[]; };
+// For each receiver of a lightmap: the paths that begin inside of a solid, or under an object that lies on the surface; then those that do so if
+// surfaces with two sides are those of solids.
+layout(binding = 20, scalar) buffer Shut { uint shut[]; };
 #endif
 layout(binding = 9, scalar) writeonly buffer Vertices { DayVertex vertices[]; };
 layout(binding = 10, scalar) writeonly buffer Escapes { DayEscape escapes[]; };
@@ -97,8 +98,10 @@ void main() {
             if (surface == 1u) start.distance = s.inside ? -hit.t : hit.t;
 #else
             if (surface == 1u && settings.touching > 0.0) {
+                bool near = hit.t < settings.touching;
                 // Light goes through glass.
-                if (s.glass == 0.0 && (s.inside || hit.t < settings.touching)) atomicAdd(buried[receiver], 1u);
+                if (s.glass == 0.0 && (near || s.inside)) atomicAdd(shut[2u * receiver], 1u);
+                if (s.glass == 0.0 && (near || !s.front)) atomicAdd(shut[2u * receiver + 1u], 1u);
             }
 #endif
             if (s.unlit) break;

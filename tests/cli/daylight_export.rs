@@ -134,7 +134,8 @@ impl Lab {
             let lamps = Layer { dimensions: 0, ..none.clone() };
             Tile { sun: none, sky, lamps, mask, light: vec![[0.0; 2]; times] }
         };
-        let tiles = unwrapped.by_tile(settings.tile).iter().enumerate().map(|(n, texels)| of_tile(texels, n)).collect();
+        let tiles =
+            unwrapped.by_tile(settings.tile).tiles.iter().enumerate().map(|(n, texels)| of_tile(texels, n)).collect();
         let stored = Stored { plan, tiles, probes: Vec::new(), corners: unwrapped.lightmap.corners };
         fs::write(self.at(name), stored.encode().unwrap()).unwrap();
         stored

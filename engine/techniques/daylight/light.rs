@@ -30,36 +30,6 @@ impl Light {
         let mut dimensions = dimensions.into_iter();
         rows.map(|(rows, noise)| Measured { dimensions: dimensions.next().unwrap_or(0), rows, noise })
     }
-
-    /// The light without the texels that are `buried`: those of a floor under a column that stands in it, or of the part of a wall that is in another
-    /// wall. They are black, and their black would darken the pixels beside them. `texels`: the number of each texel in its tile; `mask`: of the tile,
-    /// without bits.
-    pub(super) fn without_buried(mut self, buried: &[bool], texels: &[u32], mut mask: Vec<u32>) -> Self {
-        for (texel, _) in texels.iter().zip(buried).filter(|(_, buried)| !**buried) {
-            mask[*texel as usize / 32] |= 1 << (texel % 32);
-        }
-        for rows in
-            [&mut self.sun, &mut self.noise, &mut self.sky, &mut self.sky_noise, &mut self.lamps, &mut self.lamps_noise]
-        {
-            let of_texel = rows.len() / buried.len().max(1);
-            let kept = rows.chunks(of_texel.max(1)).zip(buried).filter(|(_, buried)| !**buried);
-            *rows = kept.flat_map(|(row, _)| row.iter().copied()).collect();
-        }
-        let mut buried = buried.iter();
-        self.spots.retain(|_| !buried.next().copied().unwrap_or(false));
-        Self { mask, ..self }
-    }
-}
-
-/// Paths that say whether a texel is buried, at least.
-const LEAST_BURIED: u32 = 16;
-/// Sixteenths of the paths of a buried texel that begin inside of a solid or under an object, at least. A texel beside a wall has some such paths, and on
-/// the outside of an open shell nearly half of them may hit its inside.
-const BURIED_SIXTEENTHS: u64 = 15;
-
-/// Whether a texel of which so many paths begin inside of a solid, or under an object, is buried.
-pub(super) fn is_buried(paths: u32, samples: u32) -> bool {
-    samples >= LEAST_BURIED && 16 * u64::from(paths) >= BURIED_SIXTEENTHS * u64::from(samples)
 }
 
 /// Rows of means and of noise from sums in the order of the device: for each receiver and dimension the sums of even and of odd samples.

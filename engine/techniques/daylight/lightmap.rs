@@ -4,7 +4,7 @@ use glam::Vec2;
 
 use super::{
     Baking,
-    atlas::{self, Atlas, Instance, MeshInput, texels},
+    atlas::{self, Atlas, Instance, MeshInput, texels, touched_by},
 };
 use crate::{
     Error, Result,
@@ -33,8 +33,23 @@ pub struct Unwrapped {
     pub charts: u32,
     /// The surface point of each covered texel, in the order of rows: its column and row, and the point.
     pub receivers: Vec<([u32; 2], types::Hit)>,
+    /// The number of the first triangle of each instance, and of all triangles.
+    firsts: Vec<u32>,
     /// Meshes that took a fallback, in whole sentences.
     pub notes: Vec<String>,
+}
+
+/// The texels of the tiles of a lightmap.
+#[derive(Clone, Debug)]
+pub struct TileTexels {
+    /// The texels of each tile in the order of its rows: their numbers in the tile, and their surface points.
+    pub tiles: Vec<Vec<(u32, types::Hit)>>,
+    /// The triangles that may touch each tile.
+    triangles: Vec<Vec<u32>>,
+    corners: Vec<[Vec2; 3]>,
+    firsts: Vec<u32>,
+    extent: [u32; 2],
+    side: u32,
 }
 
 /// The primitives of a scene in the order of [`crate::resident::Moment::instances`], each with its node.
@@ -104,21 +119,13 @@ pub fn unwrap(scene: &Scene, settings: &Baking) -> Result<Unwrapped> {
     }
     let receivers = texels(&rounded)
         .into_iter()
-        .map(|texel| {
-            let instance = firsts.partition_point(|first| *first <= texel.triangle) - 1;
-            let hit = types::Hit {
-                t: 1.0,
-                barycentrics: texel.barycentric,
-                instance: instance as u32,
-                triangle: texel.triangle - firsts[instance],
-            };
-            ([texel.x, texel.y], hit)
-        })
+        .map(|texel| ([texel.x, texel.y], hit_of(&firsts, texel.triangle, texel.barycentric)))
         .collect();
     Ok(Unwrapped {
         lightmap: Lightmap { extent: [rounded.width, rounded.height], corners },
         charts: rounded.charts,
         receivers,
+        firsts,
         notes: rounded.notes,
     })
 }
@@ -129,16 +136,46 @@ pub fn position(corners: [u16; 6]) -> [Vec2; 3] {
     [at(0), at(1), at(2)]
 }
 
+/// The surface point of a triangle of a lightmap. `firsts`: the number of the first triangle of each instance.
+fn hit_of(firsts: &[u32], triangle: u32, barycentrics: [f32; 2]) -> types::Hit {
+    let instance = firsts.partition_point(|first| *first <= triangle) - 1;
+    types::Hit { t: 1.0, barycentrics, instance: instance as u32, triangle: triangle - firsts[instance] }
+}
+
 impl Unwrapped {
-    /// The texels of each tile in the order of its rows: their numbers in the tile, and their surface points.
-    pub fn by_tile(&self, side: u32) -> Vec<Vec<(u32, types::Hit)>> {
-        let [columns, rows] = self.lightmap.extent.map(|texels| texels.div_ceil(side));
+    /// The texels by tile. `side`: of a tile, texels.
+    pub fn by_tile(&self, side: u32) -> TileTexels {
+        let extent = self.lightmap.extent;
+        let [columns, rows] = extent.map(|texels| texels.div_ceil(side));
         let mut tiles = vec![Vec::new(); (columns * rows) as usize];
         for ([x, y], hit) in &self.receivers {
             let tile = y / side * columns + x / side;
-            let width = side.min(self.lightmap.extent[0] - x / side * side);
+            let width = side.min(extent[0] - x / side * side);
             tiles[tile as usize].push((y % side * width + x % side, *hit));
         }
-        tiles
+        let corners: Vec<[Vec2; 3]> = self.lightmap.corners.iter().map(|corners| position(*corners)).collect();
+        let mut triangles = vec![Vec::new(); tiles.len()];
+        for (triangle, corners) in corners.iter().enumerate() {
+            let [across, down] = touched_by(corners);
+            for row in down.0 / side..=(down.1 / side).min(rows - 1) {
+                for column in across.0 / side..=(across.1 / side).min(columns - 1) {
+                    triangles[(row * columns + column) as usize].push(triangle as u32);
+                }
+            }
+        }
+        TileTexels { tiles, triangles, corners, firsts: self.firsts.clone(), extent, side }
+    }
+}
+
+impl TileTexels {
+    /// Places of a texel of a tile where its light can be gathered, the nearest to its centre first.
+    pub(super) fn places(&self, tile: u32, texel: u32) -> Vec<types::Hit> {
+        let columns = self.extent[0].div_ceil(self.side);
+        let first = [tile % columns * self.side, tile / columns * self.side];
+        let width = self.side.min(self.extent[0] - first[0]);
+        let at = [first[0] + texel % width, first[1] + texel / width];
+        let triangles = self.triangles.get(tile as usize).map_or(&[][..], Vec::as_slice);
+        let found = atlas::spread(&self.corners, triangles, at).into_iter();
+        found.map(|(triangle, barycentrics)| hit_of(&self.firsts, triangle, barycentrics)).collect()
     }
 }

@@ -11,6 +11,7 @@ pub mod atlas;
 mod baked;
 pub mod beam;
 pub mod blocks;
+mod buried;
 mod civil;
 pub mod columns;
 mod compress;

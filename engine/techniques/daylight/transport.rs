@@ -10,8 +10,10 @@ use super::{
     Baking, Group, Kind, Plan,
     adaptive::{Adaptive, SPARSE_PATHS, Sparse},
     beam::SUN_ANGULAR_RADIUS,
+    buried::Shut,
     gathered::Spot,
-    light::{Light, is_buried, summed},
+    light::{Light, summed},
+    lightmap::TileTexels,
     masks::{self, Masks},
     suns::{Paths, Share, sun_items, suns_of, words},
 };
@@ -38,6 +40,8 @@ use crate::{
 /// A path of a texel of a lightmap that meets a surface within this share of the texel's side begins under an object that lies on the texel.
 /// The side is that of `bake.density`; charts of a file's own coordinates may have other sides.
 const TOUCHING: f32 = 0.25;
+/// The same for large texels, metres: what is farther away does not lie on the surface.
+const MOST_TOUCHING: f32 = 0.02;
 /// Paths of a texel in one batch at most.
 const BATCH: u32 = 16;
 /// Maximum of loop iterations that choosing one lamp takes: a descent of the light tree.
@@ -75,8 +79,8 @@ pub enum Sources {
     View(Box<View>),
     /// The faces of a camera that turns in place ([`super::cube::views`]).
     Cube(Box<[View; 6]>),
-    /// The texels of each tile of a lightmap ([`super::lightmap::Unwrapped::by_tile`]).
-    Lightmap(Vec<Vec<(u32, types::Hit)>>),
+    /// The texels of a lightmap ([`super::lightmap::Unwrapped::by_tile`]).
+    Lightmap(Box<TileTexels>),
 }
 
 impl Transport {
@@ -137,12 +141,7 @@ impl Transport {
                     })
                     .collect()
             }
-            Sources::Lightmap(tiles) => {
-                let of_tile = tiles.get(tile as usize).map_or(&[][..], Vec::as_slice);
-                let (texels, hits): (Vec<u32>, Vec<types::Hit>) = of_tile.iter().copied().unzip();
-                let (light, buried) = self.gather(plan, plan.first_receiver(tile), &hits)?;
-                return Ok(light.without_buried(&buried, &texels, mask));
-            }
+            Sources::Lightmap(_) => return self.lightmap_tile(plan, tile, mask),
         };
         let (light, _) = self.gather(plan, plan.first_receiver(tile), &hits)?;
         Ok(Light { mask, ..light })
@@ -155,7 +154,8 @@ impl Transport {
     pub fn sparse(&mut self, plan: &Plan) -> Result<Sparse> {
         let [width, height] = plan.extent;
         let (hits, mask, extent) = match &self.sources {
-            Sources::Lightmap(tiles) => {
+            Sources::Lightmap(texels) => {
+                let tiles = &texels.tiles;
                 let every = tiles.iter().map(Vec::len).sum::<usize>().div_ceil(SPARSE).max(1);
                 let hits: Vec<_> = tiles.iter().flatten().step_by(every).map(|(_, hit)| *hit).collect();
                 (hits, Vec::new(), None)
@@ -265,8 +265,8 @@ impl Transport {
         done
     }
 
-    /// The light of some surface points, and whether each of them is buried ([`Light::without_buried`]); `first`: number of the first in the whole bake.
-    fn gather(&mut self, plan: &Plan, first: u32, hits: &[types::Hit]) -> Result<(Light, Vec<bool>)> {
+    /// The light of some surface points, and how many paths of each are shut in; `first`: number of the first in the whole bake.
+    pub(super) fn gather(&mut self, plan: &Plan, first: u32, hits: &[types::Hit]) -> Result<(Light, Vec<Shut>)> {
         let count = hits.len() as u32;
         if count == 0 {
             return Ok((Light::default(), Vec::new()));
@@ -284,7 +284,7 @@ impl Transport {
         )?;
         let escapes = buffer("daylight.escapes", paths * size_of::<types::DayEscape>() as u64)?;
         let counts = buffer("daylight.counts", paths * 4)?;
-        let buried = buffer("daylight.buried", u64::from(count) * 4)?;
+        let shut = buffer("daylight.shut", u64::from(count) * size_of::<Shut>() as u64)?;
         let sun_sums = buffer("daylight.sun", u64::from(count) * u64::from(times) * 24)?;
         let groups = plan.lamps.len() as u32;
         let lamp_sums = buffer("daylight.lamps", u64::from(count) * u64::from(groups) * 24)?;
@@ -301,7 +301,7 @@ impl Transport {
             let vertices = graph.import_buffer(&of_vertices);
             let escapes = graph.import_buffer(&escapes);
             let counts = graph.import_buffer(&counts);
-            let buried = graph.import_buffer(&buried);
+            let shut = graph.import_buffer(&shut);
             let sun_sums = graph.import_buffer(&sun_sums);
             let sky_sums = graph.import_buffer(&sky_sums);
             let lamp_sums = graph.import_buffer(&lamp_sums);
@@ -310,7 +310,7 @@ impl Transport {
                 graph.fill(sun_sums, 0);
                 graph.fill(sky_sums, 0);
                 graph.fill(lamp_sums, 0);
-                graph.fill(buried, 0);
+                graph.fill(shut, 0);
             }
             let spots = graph.buffer("daylight.spots", u64::from(count) * size_of::<types::DaySpot>() as u64);
             let of_lights = handles.moment.lights.len() as u32;
@@ -329,7 +329,7 @@ impl Transport {
                     wanted: masks.wanted,
                     requests: masks.requests,
                     spots,
-                    buried,
+                    shut,
                 },
                 rays,
                 handles
@@ -379,8 +379,8 @@ impl Transport {
                 self.run(&graph)?;
                 continue;
             }
-            let [sun, sky, lamps, spots, buried] =
-                [sun_sums, sky_sums, lamp_sums, spots, buried].map(|buffer| graph.read_buffer(buffer));
+            let [sun, sky, lamps, spots, shut] =
+                [sun_sums, sky_sums, lamp_sums, spots, shut].map(|buffer| graph.read_buffer(buffer));
             let frame = self.run(&graph)?;
             let spot = |spot: types::DaySpot| Spot { position: spot.position, normal: spot.normal };
             let spots = frame.buffer(spots).into_iter().map(spot).collect();
@@ -388,13 +388,9 @@ impl Transport {
             [light.sun, light.noise] = summed(&frame.buffer(sun), [count, times, samples]);
             [light.sky, light.sky_noise] = summed(&frame.buffer(sky), [count, consts::SKY_PATCHES, samples]);
             [light.lamps, light.lamps_noise] = summed(&frame.buffer(lamps), [count, groups, samples]);
-            let buried = frame
-                .buffer::<u32>(buried)
-                .into_iter()
-                .take(hits.len())
-                .map(|paths| is_buried(paths, samples))
-                .collect();
-            return Ok((light, buried));
+            let mut shut = frame.buffer::<Shut>(shut);
+            shut.truncate(hits.len());
+            return Ok((light, shut));
         }
     }
 }
@@ -447,7 +443,7 @@ pub(super) fn settings(
         flags |= consts::DAY_NORMAL_MAPS;
     }
     let touching = match plan.receivers {
-        Kind::Lightmap { .. } => TOUCHING / baking.density,
+        Kind::Lightmap { .. } => (TOUCHING / baking.density).min(MOST_TOUCHING),
         _ => 0.0,
     };
     if masks.wanted() {

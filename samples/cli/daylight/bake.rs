@@ -109,7 +109,7 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let folder = units_of::parts(&args.run.output)?;
     let of_tiles: Option<Vec<u64>> = match &sources {
         Sources::View(_) | Sources::Cube(_) => None,
-        Sources::Lightmap(tiles) => Some(tiles.iter().map(|tile| tile.len() as u64).collect()),
+        Sources::Lightmap(texels) => Some(texels.tiles.iter().map(|tile| tile.len() as u64).collect()),
     };
     let mut transport = Transport::new(&gpu, &stage.scene, &plan, sources)?;
     let adaptive = thin_out(&mut plan, &mut transport)?;

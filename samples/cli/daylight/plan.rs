@@ -284,7 +284,7 @@ impl Receivers {
         };
         let extent = unwrapped.lightmap.extent;
         let side = if baking.tile == 0 { extent[0].max(extent[1]) } else { baking.tile };
-        let sources = Sources::Lightmap(unwrapped.by_tile(side.max(1)));
+        let sources = Sources::Lightmap(Box::new(unwrapped.by_tile(side.max(1))));
         let notes = unwrapped.notes.iter().map(|note| format!("lightmap: {note}")).collect();
         Ok(Self { kind, extent, sources, corners, notes })
     }

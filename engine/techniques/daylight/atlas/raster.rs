@@ -30,6 +30,9 @@ struct Rank {
     triangle: u32,
 }
 
+/// Points of [`spread`] along a side of a texel.
+const GRID: u32 = 4;
+
 /// Lists every texel that a chart covers, sorted by row and then by column.
 ///
 /// The coverage is conservative: a texel is covered if its open square touches a triangle. Every texel comes once. It
@@ -49,7 +52,7 @@ pub fn texels(atlas: &Atlas) -> Vec<Texel> {
             first = first.min(from);
             last = last.max(to);
             let flat = corners.map(Vec2::as_dvec2);
-            let is_flat = (flat[1] - flat[0]).perp_dot(flat[2] - flat[0]) == 0.0;
+            let is_flat = is_flat(&flat);
             for x in from..=to {
                 let centre = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
                 let (barycentric, distance) = nearest(&flat, centre);
@@ -69,6 +72,52 @@ pub fn texels(atlas: &Atlas) -> Vec<Texel> {
         }
     }
     result
+}
+
+/// Lists places of a covered texel where its light can be gathered, the nearest to its centre first: the points of its charts that are the
+/// nearest to a grid of [`GRID`] × [`GRID`] points in the texel. `triangles`: indices of all triangles that may touch the texel.
+pub fn spread(corners: &[[Vec2; 3]], triangles: &[u32], [x, y]: [u32; 2]) -> Vec<(u32, [f32; 2])> {
+    let touches = |triangle: &&u32| {
+        let corners = &corners[**triangle as usize];
+        let rows = row_range(corners);
+        (rows.0..=rows.1).contains(&y) && {
+            let (first, last) = columns(corners, y, u32::MAX);
+            (first..=last).contains(&x)
+        }
+    };
+    let near: Vec<(u32, [DVec2; 3])> = triangles
+        .iter()
+        .filter(touches)
+        .map(|triangle| (*triangle, corners[*triangle as usize].map(|corner| corner.as_dvec2())))
+        .collect();
+    let inner = |step: u32| (f64::from(step) + 0.5) / f64::from(GRID);
+    let mut points: Vec<DVec2> =
+        (0..GRID * GRID).map(|step| DVec2::new(inner(step % GRID), inner(step / GRID))).collect();
+    let off = |point: &DVec2| point.distance_squared(DVec2::splat(0.5));
+    points.sort_by(|a, b| off(a).total_cmp(&off(b)));
+    let mut found: Vec<(u32, [f32; 2])> = Vec::new();
+    for inside in points {
+        let point = DVec2::new(f64::from(x), f64::from(y)) + inside;
+        let best = near
+            .iter()
+            .map(|(triangle, flat)| {
+                let (barycentric, distance) = nearest(flat, point);
+                (Rank { is_flat: is_flat(flat), distance, triangle: *triangle }, barycentric)
+            })
+            .reduce(|best, next| if next.0 < best.0 { next } else { best });
+        if let Some((rank, barycentric)) = best {
+            let place = (rank.triangle, barycentric);
+            if !found.contains(&place) {
+                found.push(place);
+            }
+        }
+    }
+    found
+}
+
+/// Whether a triangle has no area.
+fn is_flat(corners: &[DVec2; 3]) -> bool {
+    (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]) == 0.0
 }
 
 /// The triangles sorted by their first row.
@@ -108,10 +157,17 @@ fn touched(low: f64, high: f64) -> (u32, u32) {
     ((first) as u32, (high.ceil() - 1.0).max(first) as u32)
 }
 
+/// Gives the texels that the box of a triangle touches: its first and its last column, and its first and its last row.
+pub(in super::super) fn touched_by([a, b, c]: &[Vec2; 3]) -> [(u32, u32); 2] {
+    [[a.x, b.x, c.x], [a.y, b.y, c.y]].map(|of| {
+        let [first, second, third] = of.map(f64::from);
+        touched(first.min(second).min(third), first.max(second).max(third))
+    })
+}
+
 /// Gives the first and the last row of a triangle.
 fn row_range(corners: &[Vec2; 3]) -> (u32, u32) {
-    let [a, b, c] = corners.map(|corner| f64::from(corner.y));
-    touched(a.min(b).min(c), a.max(b).max(c))
+    touched_by(corners)[1]
 }
 
 /// Gives the first and the last column that a triangle touches in a row.
