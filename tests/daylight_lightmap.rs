@@ -204,36 +204,64 @@ fn a_closed_box_that_glows_has_its_emission_over_one_less_its_albedo_from_any_ca
     });
 }
 
-/// The least irradiance of a floor beside a black block that stands in it, or on it, seen from above; by that of an open floor. `gap`: metres
-/// between two such blocks that are narrow.
-fn beside_a_block(gpu: &Gpu, [foot, head, gap]: [f32; 3]) -> f32 {
+/// Least and mean irradiance of a floor beside a black block that stands in it, or on it, seen from above; by that of an open floor. `gap`: metres
+/// between two such blocks that are narrow, around `middle`; `side`: of the part of the floor that is seen, metres; `two_sided`: surfaces of the blocks.
+fn beside_a_block(gpu: &Gpu, [foot, head, gap, middle]: [f32; 4], side: f32, two_sided: bool) -> [f32; 2] {
     let (scene, lamp) = glowing_room(4.2, |stage, grey| {
-        let black = stage.material(Material::diffuse("black", Vec3::ZERO));
+        let black = Material { double_sided: two_sided, ..Material::diffuse("black", Vec3::ZERO) };
+        let black = stage.material(black);
         stage.quad(grey, vec3(-1.2, 0.0, -1.2), Vec3::Z * 2.4, Vec3::X * 2.4);
         if gap > 0.0 {
-            stage.cuboid(black, vec3(-0.17, foot, -0.53), vec3(-0.5 * gap, head, 0.53), false);
-            stage.cuboid(black, vec3(0.5 * gap, foot, -0.53), vec3(0.17, head, 0.53), false);
+            stage.cuboid(black, vec3(-0.17, foot, -0.53), vec3(middle - 0.5 * gap, head, 0.53), false);
+            stage.cuboid(black, vec3(middle + 0.5 * gap, foot, -0.53), vec3(0.17, head, 0.53), false);
         } else {
             stage.cuboid(black, vec3(-0.53, foot, -0.53), vec3(0.53, head, 0.53), false);
         }
     });
     let baked = lightmap_of(gpu, &scene, lamp, Baking { bounces: 2, ..baking(128) });
-    let pixels = seen(gpu, &scene, flat_view(vec3(0.0, 2.0, 0.0), Vec3::ZERO, 2.0, [160, 160]), &baked);
+    let pixels = seen(gpu, &scene, flat_view(vec3(middle, 2.0, 0.0), vec3(middle, 0.0, 0.0), side, [160, 160]), &baked);
     // The block takes 28 % of the picture.
     assert!(pixels.len() > 18_000, "{}", pixels.len());
-    range(pixels.iter().map(|(_, e)| *e))[0] / std::f32::consts::PI
+    let mean = pixels.iter().map(|(_, e)| *e).sum::<f32>() / pixels.len() as f32;
+    [range(pixels.iter().map(|(_, e)| *e))[0], mean].map(|e| e / std::f32::consts::PI)
 }
 
 #[test]
 fn a_thing_that_stands_in_a_floor_has_no_black_seam() {
     with_gpu(|gpu| {
-        for (foot, head, gap) in [(-0.5, 0.6, 0.0), (1e-4, 0.6, 0.0), (-0.5, 0.02, 0.1)] {
-            // The gap is narrower than a texel, and the middles of the nearest texels are in the blocks, which are low.
+        for (foot, two_sided) in [(-0.5, false), (1e-4, false), (-0.5, true)] {
+            let [least, _] = beside_a_block(gpu, [foot, 0.6, 0.0, 0.0], 2.0, two_sided);
+            println!("foot at {foot} m, surfaces with two sides: {two_sided}: {least:.3} of the open floor's light");
             // A floor beside a wall without an end would have half of the light, with the noise of its paths.
-            let least = beside_a_block(gpu, [foot, head, gap]);
-            println!("foot at {foot} m, gap of {gap} m: {least:.3} of the open floor's light");
-            assert!(least > if gap > 0.0 { 0.7 } else { 0.45 }, "foot at {foot} m, gap of {gap} m: {least}");
+            assert!(least > 0.45, "foot at {foot} m, surfaces with two sides: {two_sided}: {least}");
         }
+    });
+}
+
+#[test]
+fn the_floor_of_a_gap_that_is_narrower_than_a_texel_has_the_light_of_the_gap() {
+    with_gpu(|gpu| {
+        // The middles of the texels are in the blocks. In the middle between walls without an end, the floor has the light of the strip of sky
+        // that it sees: gap / √(gap² + 4 head²).
+        let gap: f32 = 0.1;
+        for head in [0.02f32, 0.3] {
+            let wanted = gap / gap.hypot(2.0 * head);
+            let [least, mean] = beside_a_block(gpu, [-0.5, head, gap, 0.0], 0.08, false);
+            println!(
+                "blocks of {head} m: {mean:.3} of the open floor's light, at least {least:.3}; {wanted:.3} in the middle"
+            );
+            assert!((mean / wanted - 1.0).abs() < 0.25 && least > 0.6 * wanted, "blocks of {head} m: {mean}, {least}");
+        }
+    });
+}
+
+#[test]
+fn the_floor_of_a_gap_between_the_places_of_a_texel_is_not_black() {
+    with_gpu(|gpu| {
+        // Places at odd eighths of a texel of 0.125 m are tried, and none is in the gap. The light is that of the floor beside the blocks.
+        let [least, mean] = beside_a_block(gpu, [-0.5, 0.02, 0.012, 0.015], 0.01, false);
+        println!("{mean:.3} of the open floor's light, at least {least:.3}");
+        assert!(least > 0.5, "{least}");
     });
 }
 

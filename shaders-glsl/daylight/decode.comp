@@ -132,15 +132,14 @@ TexelLight lightmap_light(vec2 place) {
         add(sum, texel_light(uvec2(texel)), weight);
     }
     if (sum.there < 1e-3) {
-        // All four are buried, as in a gap between objects that is narrower than a texel. The texels around them belong to the same chart, for charts
-        // are padded by more (atlas::Settings::padding).
-        for (int i = 0; i < 16; ++i) {
-            ivec2 step = ivec2(i % 4 - 1, i / 4 - 1);
-            if (all(equal(step & ~1, ivec2(0)))) continue;
-            ivec2 texel = ivec2(corner) + step;
+        // All four are buried, as in a gap between objects that is narrower than a texel. Texels nearer than four belong to the same chart, for charts
+        // are padded by as many (atlas::Settings::padding).
+        for (int i = 0; i < 64; ++i) {
+            vec2 off = vec2(i % 8 - 3, i / 8 - 3) - f;
+            ivec2 texel = ivec2(corner) + ivec2(i % 8 - 3, i / 8 - 3);
             if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(uvec2(texel), texels))) continue;
-            vec2 off = vec2(step) - f;
-            add(sum, texel_light(uvec2(texel)), 0.1 / (1.0 + dot(off, off)));
+            float squared = dot(off, off);
+            if (squared < 16.0) add(sum, texel_light(uvec2(texel)), 0.1 * exp(-squared));
         }
     }
     return mean(sum);

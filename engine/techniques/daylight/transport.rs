@@ -69,7 +69,7 @@ pub struct Transport {
     pub(super) lamps: Option<LightTable>,
     /// The group of each light, and of each material.
     pub(super) groups: OwnedBuffer,
-    sources: Sources,
+    pub(super) sources: Sources,
 }
 
 /// The texels of a bake.
