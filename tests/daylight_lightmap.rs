@@ -8,6 +8,7 @@ use crate::{
 use glam::{Mat4, Quat, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
+    image::Layers,
     scene::{Material, Scene, Transform, View},
     techniques::daylight::{
         Baked, Baking, Group, Kind, PictureSettings, Plan, Sources, Stored, digest, finish,
@@ -15,6 +16,7 @@ use lucerna::{
         lightmap::{self, Unwrapped},
         units,
     },
+    tracer::Settings,
 };
 
 fn baking(samples: u32) -> Baking {
@@ -204,6 +206,38 @@ fn a_closed_box_that_glows_has_its_emission_over_one_less_its_albedo_from_any_ca
     });
 }
 
+#[test]
+fn gloss_reflects_as_much_of_even_light_as_the_path_tracer_says() {
+    with_gpu(|gpu| {
+        for (albedo, metallic, roughness) in [(0.05, 0.0, 0.3), (0.05, 0.0, 0.9), (0.5, 0.0, 0.5), (0.7, 1.0, 0.6)] {
+            let (scene, lamp) = glowing_room(4.0, |stage, _| {
+                let body = Material { metallic, roughness, ..Material::diffuse("body", Vec3::splat(albedo)) };
+                let body = stage.material(Material { ior: 1.5, ..body });
+                stage.cuboid(body, Vec3::splat(-0.6), Vec3::splat(0.6), false);
+            });
+            let settings = Baking { bounces: 1, density: 4.0, diffuse_only: false, ..baking(256) };
+            let baked = lightmap_of(gpu, &scene, lamp, settings);
+            // A face of the body fills the picture.
+            let eye = view(vec3(0.9, 0.4, 1.7), vec3(0.1, 0.0, 0.6), 15.0, [32, 32]);
+            let pictured = |gloss: bool| {
+                let mut settings = lamps_alone();
+                settings.daylight.gloss = gloss;
+                let mut studio = Studio::with(gpu, scene.clone(), eye, &baked, &settings);
+                studio.frame(0, &settings).unwrap().0
+            };
+            let truth = render(gpu, &scene, &eye, &Settings { diffuse_only: false, ..matt(1) }, 256);
+            let sum = |layers: &Layers, name: &str| layers.layer(name).unwrap().data.iter().sum::<f32>();
+            let wanted = sum(&truth, "direct") + sum(&truth, "indirect");
+            let [found, without] = [true, false].map(|gloss| sum(&pictured(gloss), "indirect") / wanted);
+            println!(
+                "albedo {albedo}, metallic {metallic}, roughness {roughness}: {found:.4}, without gloss {without:.4}"
+            );
+            assert!((found - 1.0).abs() < 0.02, "albedo {albedo}, metallic {metallic}, roughness {roughness}: {found}");
+            assert!(without < 0.97, "{without}");
+        }
+    });
+}
+
 /// Least and mean irradiance of a floor beside a black block that stands in it, or on it, seen from above; by that of an open floor. `gap`: metres
 /// between two such blocks that are narrow, around `middle`; `side`: of the part of the floor that is seen, metres; `two_sided`: surfaces of the blocks.
 fn beside_a_block(gpu: &Gpu, [foot, head, gap, middle]: [f32; 4], side: f32, two_sided: bool) -> [f32; 2] {
@@ -277,7 +311,7 @@ fn a_lightmap_has_the_light_of_the_path_tracer_from_cameras_that_it_was_not_made
             let mut studio = Studio::with(gpu, stage.scene.clone(), eye, &baked, &lamps_alone());
             let found = studio.frame(0, &lamps_alone()).unwrap().0;
             let truth = render(gpu, &stage.scene, &eye, &matt(16), 256);
-            let of = |layers: &lucerna::image::Layers, name: &str| layers.layer(name).unwrap().data.clone();
+            let of = |layers: &Layers, name: &str| layers.layer(name).unwrap().data.clone();
             let [a, b, c] = [of(&found, "indirect"), of(&truth, "direct"), of(&truth, "indirect")];
             let [found, wanted] = (0..a.len())
                 .fold([0.0f64; 2], |[found, wanted], i| [found + f64::from(a[i]), wanted + f64::from(b[i] + c[i])]);

@@ -9,13 +9,14 @@
 #define DAY_BLOCKS
 #include "daylight/tiles.glsl"
 #include "daylight/cube.glsl"
+#include "daylight/reflect.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
 layout(binding = 1) uniform sampler2D albedo;
 layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3) uniform sampler2D direct;         // with emission
-layout(binding = 4) uniform sampler2D specular;       // rgb: F0
+layout(binding = 4) uniform sampler2D specular;       // rgb: F0; a: roughness
 layout(binding = 5, rgba16f) uniform writeonly image2D total;
 layout(binding = 6, rgba16f) uniform writeonly image2D indirect;
 layout(binding = 7, rgba16f) uniform writeonly image2D irradiance;
@@ -36,6 +37,7 @@ layout(constant_id = 0) const uint TEXELS_OF = DAY_VIEW;
 layout(constant_id = 1) const uint FRAMES = 0u;
 // The light between two times is the line between its logarithms.
 layout(constant_id = 2) const uint LOGARITHMS = 0u;
+layout(constant_id = 4) const uint GLOSS = 1u;
 
 layout(push_constant, scalar) uniform Push {
     uint side;     // of a tile, texels
@@ -132,14 +134,15 @@ TexelLight lightmap_light(vec2 place) {
         add(sum, texel_light(uvec2(texel)), weight);
     }
     if (sum.there < 1e-3) {
-        // All four are buried, as in a gap between objects that is narrower than a texel. Texels nearer than four belong to the same chart, for charts
-        // are padded by as many (atlas::Settings::padding).
-        for (int i = 0; i < 64; ++i) {
-            vec2 off = vec2(i % 8 - 3, i / 8 - 3) - f;
-            ivec2 texel = ivec2(corner) + ivec2(i % 8 - 3, i / 8 - 3);
+        // All four are buried, as in a gap between objects that is narrower than a texel. The texels around them belong to the same chart, for charts
+        // are padded by more (atlas::Settings::padding).
+        for (int i = 0; i < 16; ++i) {
+            ivec2 step = ivec2(i % 4 - 1, i / 4 - 1);
+            if (all(equal(step & ~1, ivec2(0)))) continue;
+            ivec2 texel = ivec2(corner) + step;
             if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(uvec2(texel), texels))) continue;
-            float squared = dot(off, off);
-            if (squared < 16.0) add(sum, texel_light(uvec2(texel)), 0.1 * exp(-squared));
+            vec2 off = vec2(step) - f;
+            add(sum, texel_light(uvec2(texel)), 0.1 / (1.0 + dot(off, off)));
         }
     }
     return mean(sum);
@@ -160,11 +163,8 @@ void cube_texel(inout TexelLight sum, uint face, ivec2 at, vec3 seen, vec3 n, fl
     add(sum, texel_light(uvec2(texel.z * side_texels + texel.x, texel.y)), share * max(alike, 1e-4));
 }
 
-// Bilinear between the texels of the faces in the direction of the pixel.
-TexelLight cube_light(ivec2 pixel) {
-    vec2 uv = (vec2(pixel) + 0.5) / view.extent;
-    vec3 seen = world_from_depth(view, uv, texelFetch(depth, pixel, 0).r) - view.position;
-    vec3 n = decode_normal(texelFetch(normal, pixel, 0));
+// Bilinear between the texels of the faces in the direction of a pixel that sees a surface with normal `n` at `seen` from the camera.
+TexelLight cube_light(vec3 seen, vec3 n) {
     vec2 place;
     uint face = day_cube_face(seen, place);
     vec2 at = place * float(texels.y) - 0.5;
@@ -205,21 +205,22 @@ void main() {
         imageStore(irradiance, pixel, vec4(0.0));
         return;
     }
+    vec3 position = world_from_depth(view, (vec2(pixel) + 0.5) / view.extent, texelFetch(depth, pixel, 0).r);
+    vec3 n = decode_normal(texelFetch(normal, pixel, 0));
     TexelLight light = TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
     if (TEXELS_OF == DAY_VIEW) {
         light = texel_light(uvec2(pixel));
     } else if (TEXELS_OF == DAY_CUBE) {
-        light = cube_light(pixel);
+        light = cube_light(position - view.position, n);
     } else {
         vec2 place = texelFetch(places, pixel, 0).xy;
         if (place.x >= 0.0) light = lightmap_light(place);
     }
     vec3 e = light.there > 0.0 ? irradiance_of(light) : vec3(0.0);
     if (fetched > 0u) atomicAdd(fetches[(gl_WorkGroupID.x + 7u * gl_WorkGroupID.y) & 255u], fetched);
-    vec4 color = texelFetch(albedo, pixel, 0);
-    // Gloss reflects the indirect light as a diffuse surface of the same reflectance does; a dielectric's 4 % are left out, as in direct light.
-    vec3 reflectance = color.rgb + max(texelFetch(specular, pixel, 0).rgb - 0.04, 0.0);
-    vec3 bounced = color.a * reflectance * e / 3.14159265358979;
+    float cosine = dot(n, to_camera(view, position));
+    vec3 reflectance = day_reflectance(texelFetch(albedo, pixel, 0), texelFetch(specular, pixel, 0), cosine, GLOSS != 0u);
+    vec3 bounced = reflectance * e / 3.14159265358979;
     imageStore(total, pixel, vec4(shown.rgb + bounced, 1.0));
     imageStore(indirect, pixel, vec4(bounced, 1.0));
     imageStore(irradiance, pixel, vec4(e, 1.0));

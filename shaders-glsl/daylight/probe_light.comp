@@ -7,6 +7,7 @@
 #include "lib/view.glsl"
 #include "lib/scene.glsl"
 #include "daylight/probe.glsl"
+#include "daylight/reflect.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -14,7 +15,7 @@ layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 1) uniform sampler2D albedo;
 layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3) uniform sampler2D direct;         // with emission
-layout(binding = 4) uniform sampler2D specular;       // rgb: F0
+layout(binding = 4) uniform sampler2D specular;       // rgb: F0; a: roughness
 layout(binding = 5) uniform sampler2D normals;
 layout(binding = 6) uniform sampler2D mask;
 // Other pixels keep what they have.
@@ -25,6 +26,8 @@ layout(binding = 10, scalar) uniform GridBlock { DayGrid grid; };
 layout(binding = 11, scalar) readonly buffer Probes { DayProbe probes[]; };
 layout(binding = 12, scalar) readonly buffer Distances { uint distances[]; };  // mean and mean square, halves; texel after texel of each probe
 layout(binding = 13, scalar) readonly buffer Light { vec3 light[]; };          // PROBE_TERMS for each probe
+
+layout(constant_id = 0) const uint GLOSS = 1u;
 
 vec3 probe_irradiance(uint probe, float harmonics[PROBE_TERMS]) {
     vec3 e = vec3(0.0);
@@ -101,11 +104,11 @@ void main() {
     if (any(greaterThanEqual(pixel, size)) || texelFetch(mask, pixel, 0).r < 0.5) return;
     vec2 uv = (vec2(pixel) + 0.5) / vec2(size);
     vec3 position = world_from_depth(view, uv, texelFetch(depth, pixel, 0).r);
-    vec3 e = probes_at(position, decode_normal(texelFetch(normals, pixel, 0)));
-    vec4 color = texelFetch(albedo, pixel, 0);
-    // As decode.comp does.
-    vec3 reflectance = color.rgb + max(texelFetch(specular, pixel, 0).rgb - 0.04, 0.0);
-    vec3 bounced = color.a * reflectance * e / 3.14159265358979;
+    vec3 n = decode_normal(texelFetch(normals, pixel, 0));
+    vec3 e = probes_at(position, n);
+    float cosine = dot(n, to_camera(view, position));
+    vec3 reflectance = day_reflectance(texelFetch(albedo, pixel, 0), texelFetch(specular, pixel, 0), cosine, GLOSS != 0u);
+    vec3 bounced = reflectance * e / 3.14159265358979;
     imageStore(total, pixel, vec4(texelFetch(direct, pixel, 0).rgb + bounced, 1.0));
     imageStore(indirect, pixel, vec4(bounced, 1.0));
     imageStore(irradiance, pixel, vec4(e, 1.0));

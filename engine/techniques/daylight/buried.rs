@@ -11,9 +11,8 @@ const LEAST: u32 = 16;
 /// Sixteenths of the paths of a buried place that begin inside of a solid or under an object, at least. A place beside a wall has some such paths, and on
 /// the outside of an open shell nearly half of them may hit its inside.
 const SIXTEENTHS: u64 = 15;
-/// A texel of which half of the paths are shut in moves to its nearest place where at most so many of [`LEAST`] paths are. A buried texel without such
-/// a place moves to the one with the fewest.
-const FEW: u32 = 4;
+/// A texel moves to its nearest place if at most so many of [`LEAST`] paths are shut in there, else to the place with the fewest.
+const FEW: u32 = 8;
 
 /// The paths of a place whose first surface shuts it in.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
@@ -26,11 +25,6 @@ pub(super) struct Shut {
 }
 
 impl Shut {
-    /// Whether half of the paths may be shut in, as those of a place behind a wall that is a single sheet.
-    fn is_half(self, samples: u32) -> bool {
-        samples >= LEAST && 2 * u64::from(self.perhaps) >= u64::from(samples)
-    }
-
     /// Whether the place is buried. Solids whose surfaces have two sides cannot be told from sheets, as curtains are; a place that sees only backs of
     /// such surfaces is buried if it is `dark` at all times.
     fn is_buried(self, samples: u32, dark: bool) -> bool {
@@ -47,15 +41,14 @@ impl Transport {
         let (texels, hits): (Vec<u32>, Vec<types::Hit>) = of_tile.iter().copied().unzip();
         let first = plan.first_receiver(tile);
         let samples = plan.settings.samples;
-        let (mut light, shut) = self.gather(plan, first, &hits)?;
         let count = hits.len();
+        let (mut light, shut) = self.gather(plan, first, &hits)?;
         let mut buried: Vec<bool> =
-            (0..count).map(|texel| shut[texel].is_buried(samples, light.is_dark(texel, hits.len()))).collect();
-        let wished: Vec<usize> = (0..count).filter(|texel| buried[*texel] || shut[*texel].is_half(samples)).collect();
-        let places =
-            self.clear_places(plan, tile, wished.iter().map(|texel| (texels[*texel], buried[*texel])).collect())?;
+            (0..count).map(|texel| shut[texel].is_buried(samples, light.is_dark(texel, count))).collect();
+        let moved: Vec<usize> = (0..count).filter(|texel| buried[*texel]).collect();
+        let places = self.clear_places(plan, tile, &moved.iter().map(|texel| texels[*texel]).collect::<Vec<_>>())?;
         let (moved, hits): (Vec<usize>, Vec<types::Hit>) =
-            wished.into_iter().zip(places).filter_map(|(texel, place)| Some((texel, place?))).unzip();
+            moved.into_iter().zip(places).filter_map(|(texel, place)| Some((texel, place?))).unzip();
         let (there, shut) = self.gather(plan, first, &hits)?;
         let clear = |number: &usize| !shut[*number].is_buried(samples, there.is_dark(*number, hits.len()));
         let taken: Vec<(usize, usize)> = (0..hits.len()).filter(clear).map(|number| (moved[number], number)).collect();
@@ -64,10 +57,10 @@ impl Transport {
         Ok(light.without_buried(&buried, &texels, mask))
     }
 
-    /// For each of some texels of a tile a place with a better view, if there is one. `texels`: their numbers in the tile, and whether they are buried.
-    fn clear_places(&mut self, plan: &Plan, tile: u32, texels: Vec<(u32, bool)>) -> Result<Vec<Option<types::Hit>>> {
+    /// For each of some texels of a tile a place that is not buried, if one is.
+    fn clear_places(&mut self, plan: &Plan, tile: u32, texels: &[u32]) -> Result<Vec<Option<types::Hit>>> {
         let Sources::Lightmap(all) = &self.sources else { return Ok(Vec::new()) };
-        let places: Vec<Vec<types::Hit>> = texels.iter().map(|(texel, _)| all.places(tile, *texel)).collect();
+        let places: Vec<Vec<types::Hit>> = texels.iter().map(|texel| all.places(tile, *texel)).collect();
         let most = all.tiles.get(tile as usize).map_or(1, Vec::len).max(1);
         let hits: Vec<types::Hit> = places.iter().flatten().copied().collect();
         let settings = Baking { samples: LEAST, bounces: 1, sun_masks: 0.0, ..plan.settings.clone() };
@@ -77,13 +70,13 @@ impl Transport {
             shut.extend(self.gather(&plan, plan.first_receiver(tile), part)?.1);
         }
         let mut first = 0;
-        let clear = places.into_iter().zip(texels).map(|(places, (_, buried))| {
+        let clear = places.into_iter().map(|places| {
             let of = &shut[first..first + places.len()];
             first += places.len();
             let open = |place: &usize| !of[*place].is_buried(LEAST, true);
             let near = (0..places.len()).find(|place| of[*place].perhaps <= FEW);
             let best = || (0..places.len()).filter(open).min_by_key(|place| of[*place].perhaps);
-            near.or_else(|| best().filter(|_| buried)).map(|place| places[place])
+            near.or_else(best).map(|place| places[place])
         });
         Ok(clear.collect())
     }

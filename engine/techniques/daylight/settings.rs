@@ -224,7 +224,8 @@ pub struct Settings {
     pub sky: SkyLight,
     /// How images of the bake that are in blocks reach a picture.
     pub blocks: Sampling,
-    /// Direct light of the sun has highlights. If off, Lambert's law alone.
+    /// Direct light of the sun has highlights, and surfaces reflect as much of the baked light by their gloss as of light from everywhere alike. If
+    /// off, Lambert's law alone.
     pub gloss: bool,
     /// Haze of the air: 1 is clear mountain air, 10 is thick haze.
     #[schemars(range(min = 1, max = 10))]

@@ -375,6 +375,7 @@ impl Technique for Daylight {
         let gbuffer = gbuffer::draw(graph, &handles, view, &settings.gbuffer);
         let shadows = shadow::draw(graph, &handles, view, &settings.shadow);
         let choices = Direct { specular: of_day.gloss, ..Direct::default() };
+        let gloss = of_day.gloss && !self.baked.stored.plan.settings.diffuse_only;
         let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &choices);
         let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
         let [total, indirect, irradiance] =
@@ -405,6 +406,7 @@ impl Technique for Daylight {
                 frames: if self.light.has_frames() { mixture.times().count() as u32 + 1 } else { 0 },
                 logarithms: logarithms.into(),
                 blocks: self.light.pages().are_there().into(),
+                gloss: gloss.into(),
             },
             view: gbuffer.view,
             normal: gbuffer.normal,
@@ -443,7 +445,7 @@ impl Technique for Daylight {
             let tiles = self.baked.stored.probes.iter().map(|brick| &brick.light);
             let light = field.decode(graph, tiles, moment);
             let pixels = probes::Pixels { mask, direct: lit.direct, total, indirect, irradiance };
-            field.shine(graph, &gbuffer, view, light, &pixels);
+            field.shine(graph, &gbuffer, view, light, &pixels, gloss);
         }
         skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, total);
         skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, lit.direct);

@@ -262,3 +262,29 @@ fn every_padding_and_block_keeps_the_charts_apart() {
         checked(&meshes, &instances, &wanted);
     }
 }
+
+#[test]
+fn places_of_a_texel_are_spread_over_the_part_of_it_that_charts_cover() {
+    // The lower left half of a square, and a triangle that touches none of the texels below.
+    let corners = [
+        [Vec2::new(1.0, 1.0), Vec2::new(5.0, 1.0), Vec2::new(1.0, 5.0)],
+        [Vec2::new(7.0, 7.0), Vec2::new(8.0, 7.0), Vec2::new(7.0, 8.0)],
+    ];
+    let at = |texel| -> Vec<Vec2> {
+        let point = |(triangle, [u, v]): (u32, [f32; 2])| {
+            let [a, b, c] = corners[triangle as usize];
+            a + (b - a) * u + (c - a) * v
+        };
+        spread(&corners, &[0, 1], texel).into_iter().map(point).collect()
+    };
+    let inside = at([1, 1]);
+    assert_eq!(inside.len(), 16);
+    let off = |p: &Vec2| p.distance(Vec2::splat(1.5));
+    assert!(inside.iter().all(|p| (p - Vec2::splat(1.5)).abs().max_element() < 0.376), "{inside:?}");
+    assert!(inside.is_sorted_by(|a, b| off(a) <= off(b) + 1e-5), "{inside:?}");
+    // Grid points beyond the long edge move onto it, and each place comes once.
+    let cut = at([3, 2]);
+    assert!(cut.iter().all(|p| p.x + p.y <= 6.0 + 1e-5), "{cut:?}");
+    assert!(cut.iter().any(|p| p.x + p.y < 5.6) && cut.len() < 16, "{cut:?}");
+    assert_eq!(at([5, 5]), []);
+}

@@ -113,8 +113,16 @@ impl Field {
         light
     }
 
-    /// Replaces the indirect light at the pixels of added objects. `light`: of [`Self::decode`].
-    pub fn shine(&self, graph: &mut Graph, gbuffer: &GBuffer, view: &View, light: Buffer, pixels: &Pixels) {
+    /// Replaces the indirect light at the pixels of added objects. `light`: of [`Self::decode`]; `gloss`: reflects it.
+    pub fn shine(
+        &self,
+        graph: &mut Graph,
+        gbuffer: &GBuffer,
+        view: &View,
+        light: Buffer,
+        pixels: &Pixels,
+        gloss: bool,
+    ) {
         let Pixels { mask, direct, total, indirect, irradiance } = *pixels;
         let args = probe_light::Args {
             view: gbuffer.view,
@@ -131,6 +139,7 @@ impl Field {
             probes: graph.import_buffer(&self.probes),
             distances: graph.import_buffer(&self.distances),
             light,
+            spec: probe_light::Spec { gloss: gloss.into() },
         };
         graph.compute(args, view.extent);
     }
