@@ -24,8 +24,8 @@ use std::collections::BTreeMap;
 use glam::{DMat3, Mat4, Vec2, Vec3};
 
 pub use dilate::padding_sources;
-pub(super) use raster::touched_by;
-pub use raster::{Texel, spread, texels};
+pub use raster::{Texel, texels};
+pub(super) use raster::{spread, touched_by};
 
 use layout::Layout;
 use surface::Surface;

@@ -76,7 +76,7 @@ pub fn texels(atlas: &Atlas) -> Vec<Texel> {
 
 /// Lists places of a covered texel where its light can be gathered, the nearest to its centre first: the points of its charts that are the
 /// nearest to a grid of [`GRID`] × [`GRID`] points in the texel. `triangles`: indices of all triangles that may touch the texel.
-pub fn spread(corners: &[[Vec2; 3]], triangles: &[u32], [x, y]: [u32; 2]) -> Vec<(u32, [f32; 2])> {
+pub(in super::super) fn spread(corners: &[[Vec2; 3]], triangles: &[u32], [x, y]: [u32; 2]) -> Vec<(u32, [f32; 2])> {
     let touches = |triangle: &&u32| {
         let corners = &corners[**triangle as usize];
         let rows = row_range(corners);
