@@ -42,7 +42,7 @@ def sheet(lucerna, folder, runs, layer, output, work):
     methods = [row for row in ROWS if (row, times[0]) in runs]
     columns = []
     for time in times:
-        truth = pixels(lucerna, runs[methods[-1], time], "", work)
+        truth = pixels(lucerna, runs[ROWS[-1], time], "", work)
         greens = sorted(value for row in truth[2] for value in row[1::3])
         factor = -math.log(1 - GREY) / max(greens[int(SHARE * (len(greens) - 1))], 1e-9)
         columns.append([exposed(pixels(lucerna, runs[row, time], layer, work)[2], factor) for row in methods])

@@ -82,6 +82,7 @@ fn dispatches_of_few_rays_have_the_same_light() {
             // One ray is less than each item has: a dispatch for each time.
             let [whole, cut] = [None, Some(1)].map(light);
             assert!(whole.iter().any(|light| *light > 0.0));
+            assert_eq!(whole.len(), cut.len());
             for (whole, cut) in whole.iter().zip(&cut) {
                 assert!((whole - cut).abs() <= 1e-5 * whole, "{whole} and {cut}, masks {sun_masks}");
             }
@@ -96,10 +97,12 @@ fn the_light_of_a_time_does_not_depend_on_the_other_times() {
         let sources = Sources::View(Box::new(eye));
         for sun_masks in [0.0, 0.2] {
             let [all, _] = days(&scene, &eye, &Baking { samples: 8, sun_masks, ..baking() });
-            // Times of all words, and of none of them the first.
+            // Times of each word, without its first time.
             let some = [10, 40, 50, 69];
             let alone = Plan { times: some.map(|time| all.times[time]).to_vec(), ..all.clone() };
             let [all, alone] = [&all, &alone].map(|plan| sun_of(gpu, &scene, plan, &sources));
+            assert!(alone.iter().any(|light| *light > 0.0));
+            assert_eq!(all.len() / 70, alone.len() / some.len());
             for (all, alone) in all.chunks_exact(70).zip(alone.chunks_exact(some.len())) {
                 assert_eq!(some.map(|time| all[time]), alone, "masks {sun_masks}");
             }

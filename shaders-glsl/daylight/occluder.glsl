@@ -20,8 +20,8 @@ DayOccluder no_occluder() {
     return DayOccluder(vec3[](vec3(0.0), vec3(0.0), vec3(0.0)));
 }
 
-// The triangle as an occluder, seen from a point. No occluder are triangles from which alpha may cut parts, and those that are too thin for the precision
-// of their coordinates.
+// The triangle as an occluder, seen from a point. A triangle is no occluder if alpha may cut parts from it, or if it is too thin for the precision of its
+// coordinates.
 DayOccluder occluder_of(uint instance, uint triangle, vec3 from) {
     if ((MATERIAL_AT(INSTANCE_AT(instance).material).flags & (MATERIAL_MASK | MATERIAL_BLEND)) != 0u) return no_occluder();
     vec3 corners[3] = surface_corners(instance, surface_vertices(instance, triangle));

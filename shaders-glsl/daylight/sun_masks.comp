@@ -25,7 +25,7 @@ layout(binding = 12, scalar) buffer Bits { uint bits[]; };
 
 // The first point that is not of this invocation, and the next point.
 uint end_point, next_point;
-// Of the triangle of the current point.
+// The normal of the current point's triangle.
 vec3 normal;
 
 bool next_place(out SunPlace place) {

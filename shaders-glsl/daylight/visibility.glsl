@@ -26,7 +26,7 @@ bool wants_ray(SunPlace place, DaySun sun);
 // Words of this invocation: rows of groups share the words of the times between them.
 uint first_word, end_word;
 
-// The ray of this invocation, and what is known about the current place.
+// The current place of this invocation, its occluder, and its times.
 SunPlace place;
 DayOccluder occluder;
 uint word;    // of the place; end_word: there is no place yet

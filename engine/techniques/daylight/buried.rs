@@ -18,9 +18,9 @@ const FEW: u32 = 8;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, bytemuck::Pod, bytemuck::Zeroable)]
 #[repr(C)]
 pub(super) struct Shut {
-    /// By the back of a surface that has only one side, or at once.
+    /// Paths that first meet the back of a one-sided surface, or a surface that touches the place.
     pub(super) surely: u32,
-    /// Also by the back of a surface that has two sides.
+    /// The same, and paths that first meet the back of a two-sided surface.
     pub(super) perhaps: u32,
 }
 
@@ -46,7 +46,8 @@ impl Transport {
         let mut buried: Vec<bool> =
             (0..count).map(|texel| shut[texel].is_buried(samples, light.is_dark(texel, count))).collect();
         let moved: Vec<usize> = (0..count).filter(|texel| buried[*texel]).collect();
-        let places = self.clear_places(plan, tile, &moved.iter().map(|texel| texels[*texel]).collect::<Vec<_>>())?;
+        let wanted = moved.iter().map(|texel| (texels[*texel], !shut[*texel].is_buried(samples, false))).collect();
+        let places = self.clear_places(plan, tile, wanted)?;
         let (moved, hits): (Vec<usize>, Vec<types::Hit>) =
             moved.into_iter().zip(places).filter_map(|(texel, place)| Some((texel, place?))).unzip();
         let (there, shut) = self.gather(plan, first, &hits)?;
@@ -57,10 +58,14 @@ impl Transport {
         Ok(light.without_buried(&buried, &texels, mask))
     }
 
-    /// For each of some texels of a tile a place that is not buried, if one is.
-    fn clear_places(&mut self, plan: &Plan, tile: u32, texels: &[u32]) -> Result<Vec<Option<types::Hit>>> {
+    /// For each of some texels of a tile a place that is not buried, if one is. `texels`: their numbers in the tile, and whether backs of two-sided
+    /// surfaces bury them.
+    fn clear_places(&mut self, plan: &Plan, tile: u32, texels: Vec<(u32, bool)>) -> Result<Vec<Option<types::Hit>>> {
+        if texels.is_empty() {
+            return Ok(Vec::new());
+        }
         let Sources::Lightmap(all) = &self.sources else { return Ok(Vec::new()) };
-        let places: Vec<Vec<types::Hit>> = texels.iter().map(|texel| all.places(tile, *texel)).collect();
+        let places: Vec<Vec<types::Hit>> = texels.iter().map(|(texel, _)| all.places(tile, *texel)).collect();
         let most = all.tiles.get(tile as usize).map_or(1, Vec::len).max(1);
         let hits: Vec<types::Hit> = places.iter().flatten().copied().collect();
         let settings = Baking { samples: LEAST, bounces: 1, sun_masks: 0.0, ..plan.settings.clone() };
@@ -70,12 +75,12 @@ impl Transport {
             shut.extend(self.gather(&plan, plan.first_receiver(tile), part)?.1);
         }
         let mut first = 0;
-        let clear = places.into_iter().map(|places| {
+        let clear = places.into_iter().zip(texels).map(|(places, (_, two_sided))| {
             let of = &shut[first..first + places.len()];
             first += places.len();
-            let open = |place: &usize| !of[*place].is_buried(LEAST, true);
+            let open = |place: &usize| !of[*place].is_buried(LEAST, two_sided);
             let near = (0..places.len()).find(|place| of[*place].perhaps <= FEW);
-            let best = || (0..places.len()).filter(open).min_by_key(|place| of[*place].perhaps);
+            let best = || (0..places.len()).filter(open).min_by_key(|place| (of[*place].perhaps, of[*place].surely));
             near.or_else(best).map(|place| places[place])
         });
         Ok(clear.collect())
@@ -96,11 +101,11 @@ impl Light {
         })
     }
 
-    /// Takes the light of some texels from other light. `count` and `others`: of texels; `taken`: numbers of texels here and there.
-    fn take(&mut self, count: usize, mut other: Self, others: usize, taken: &[(usize, usize)]) {
+    /// Takes the light of some texels from other light. `count` and `other_count`: of texels; `taken`: numbers of texels here and there.
+    fn take(&mut self, count: usize, mut other: Self, other_count: usize, taken: &[(usize, usize)]) {
         for (to, from) in self.rows().into_iter().zip(other.rows()) {
             let row = to.len() / count.max(1);
-            debug_assert_eq!(row * others, from.len());
+            debug_assert_eq!(row * other_count, from.len());
             for (texel, number) in taken {
                 to[texel * row..(texel + 1) * row].copy_from_slice(&from[number * row..(number + 1) * row]);
             }

@@ -51,7 +51,7 @@ pub(super) struct Share {
 
 impl Share {
     /// CPU drivers run few invocations together. Each has several places, so that all end at about the same time, and the triangle that hides the sun is
-    /// kept through the whole day. GPUs run many invocations: each has one word of one place. Drivers that end long loops get as little work.
+    /// kept through the whole day. GPUs run many invocations: each has one word of one place. Drivers that end long loops get the share of GPUs.
     pub fn of(gpu: &Gpu) -> Result<Self> {
         let whole = gpu.caps().kind == DeviceKind::Cpu && gpu.loop_limit()?.is_none();
         Ok(Self { places: if whole { 4 } else { 1 }, whole })

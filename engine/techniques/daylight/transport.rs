@@ -40,7 +40,7 @@ use crate::{
 /// A path of a texel of a lightmap that meets a surface within this share of the texel's side begins under an object that lies on the texel.
 /// The side is that of `bake.density`; charts of a file's own coordinates may have other sides.
 const TOUCHING: f32 = 0.25;
-/// The same for large texels, metres: what is farther away does not lie on the surface.
+/// Maximum of that distance, metres: a surface farther away does not lie on the texel.
 const MOST_TOUCHING: f32 = 0.02;
 /// Paths of a texel in one batch at most.
 const BATCH: u32 = 16;
@@ -199,7 +199,11 @@ impl Transport {
         let sums: u64 = plan.dimensions().iter().map(|count| 2 * 24 * *count as u64).sum();
         let of_masks = if masks { vertices * (4 + size_of::<types::DayMaskPoint>() as u64) } else { 0 };
         paths * (of_path + of_masks + 4 * vertices * u64::from(words))
-            + texels * (sums + size_of::<types::Hit>() as u64 + size_of::<types::DaySpot>() as u64 + 4)
+            + texels
+                * (sums
+                    + size_of::<types::Hit>() as u64
+                    + size_of::<types::DaySpot>() as u64
+                    + 2 * size_of::<Shut>() as u64)
     }
 
     /// Goes on with the times of another plan of the same texels.

@@ -70,9 +70,9 @@ fn hours(time: &str) -> f64 {
 pub(super) fn section(results: &Results) -> Result<Section> {
     let mut section = Section::new("Section 4.1: the technique against the path tracer");
     section.text(
-        "The light of sun and sky alone; the scene's own lights are off. The path tracer has all surfaces as they are, the technique shows no gloss under \
-         the baked light. On dark surfaces that is much of the light. So one row has diffuse surfaces alone on both sides: what differs there is neither \
-         gloss nor a mirror. *Energy* is the mean of the picture over that of the reference, *baked* the same for all light but the sun's direct \
+        "The light of sun and sky alone; the scene's own lights are off. The path tracer has all surfaces as they are; gloss of the \
+         technique reflects baked light as light from everywhere alike, without its direction. One row has diffuse surfaces alone on both sides: what \
+         differs there is neither gloss nor a mirror. *Energy* is the mean of the picture over that of the reference, *baked* the same for all light but the sun's direct \
          light. All errors are of linear radiance; *FLIP* and *PDiff* are of the picture as a screen shows it at the exposure that suits the reference. Where the sun shines, few \
          pixels at the edges of its light may make most of the relative MSE of the picture. The paper shows such pictures with 3ds Max as its reference, and gives no numbers. Reference pictures have noise of their own, and \
          the bake has its noise too (see the table of sizes).",
