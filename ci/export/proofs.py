@@ -139,7 +139,7 @@ def cube(proofs, options, run, daylight):
     apart, largest = rebuild.difference(export.light(seconds("12:00")), rebuild.read_exr(folder / "lightmap-1200.exr"))
     proofs.check(apart < 1e-3, f"cube, numpy, 12:00: {apart:.1e} of the mean (root mean square), largest {largest:.1e}")
     picture = options.folder / "cube.pfm"
-    run(daylight, "render", *scene, *size, "--bake", bake, "--mode", "indirect", "-D", "daylight.gloss=false", "--time", "12:00", "-q", "-o", picture)
+    run(daylight, "render", *scene, *size, "--bake", bake, "--mode", "indirect", "--aa", "1", "-D", "daylight.gloss=false", "--time", "12:00", "-q", "-o", picture)
     address = serve({"/": READERS, "/node_modules/": options.modules, "/export/": folder})
     browser = Browser(WIDTH + 500, HEIGHT + 400)
     browser.open(f"{address}/viewer.html?export=export&size={WIDTH}x{HEIGHT}")
@@ -166,7 +166,7 @@ def days(proofs, options, run, daylight):
         apart, _ = rebuild.difference(export.light(seconds("12:00")), rebuild.read_exr(folder / f"lightmap-{date}-1200.exr"))
         proofs.check(apart < 1e-3, f"days, numpy, {date} 12:00: {apart:.1e} of the mean (root mean square)")
         picture = options.folder / f"{date}.pfm"
-        run(daylight, "render", *scene, *size, "--bake", bake, "--mode", "indirect", "-D", "daylight.gloss=false", "--date", date, "--time", "12:00", "-q", "-o", picture)
+        run(daylight, "render", *scene, *size, "--bake", bake, "--mode", "indirect", "--aa", "1", "-D", "daylight.gloss=false", "--date", date, "--time", "12:00", "-q", "-o", picture)
         pixels = browser.floats(f"(day('{date}'), indirect({seconds('12:00')}))").reshape(HEIGHT, WIDTH, 4)[..., :3]
         proofs.pictures(f"days, three.js, {date} 12:00", read_pfm(picture), pixels)
     browser.close()
@@ -205,7 +205,7 @@ def main():
         ours = {}
         for time in times:
             picture = options.folder / f"{name}-{time.replace(':', '')}.pfm"
-            run(daylight, "render", *scene, *size, "--bake", bake, "--mode", "indirect", "-D", "daylight.gloss=false", "--time", time, "-q", "-o", picture)
+            run(daylight, "render", *scene, *size, "--bake", bake, "--mode", "indirect", "--aa", "1", "-D", "daylight.gloss=false", "--time", time, "-q", "-o", picture)
             ours[time] = read_pfm(picture)
         address = serve({"/": READERS, "/node_modules/": options.modules, "/export/": folder, "/babylon.html": HERE / "babylon.html"})
         browser = Browser(WIDTH + 500, HEIGHT + 400)
