@@ -266,7 +266,7 @@ fn beside_a_block(
             primitive.normals.iter_mut().for_each(|normal| *normal = -*normal);
         }
     }
-    let baked = lightmap_of(gpu, &scene, lamp, Baking { bounces: 2, ..baking(128) });
+    let baked = lightmap_of(gpu, &scene, lamp, Baking { bounces: 2, ..baking(1024) });
     let pixels = seen(gpu, &scene, flat_view(vec3(middle, 2.0, 0.0), vec3(middle, 0.0, 0.0), side, [160, 160]), &baked);
     // A block takes at most 28 % of the picture.
     assert!(pixels.len() > 18_000, "{}", pixels.len());

@@ -1,6 +1,5 @@
 //! The pixels of objects that were added at run time.
 
-use super::PictureSettings;
 use crate::{
     graph::{Cull, Depth, Draw, DrawCall, Format, Graph, Image, Load, Raster, Targets},
     passes::{
@@ -46,19 +45,19 @@ pub(super) fn shine(
     lamps: Vec<types::Light>,
     (view, gbuffer): (&View, &GBuffer),
     [mask, direct]: [Image; 2],
-    settings: &PictureSettings,
+    (settings, gloss): (&shadow::Settings, bool),
 ) -> Vec<Note> {
     let mut moment = (*handles.moment).clone();
     let lights = graph.buffer_from("daylight.lamps", &resident::lights_bytes(&lamps));
     moment.lights = lamps;
     let handles = Handles { lights, moment: moment.into(), ..handles.clone() };
     graph.scope("lamps", |graph| {
-        let shadows = shadow::draw(graph, &handles, view, &settings.shadow);
+        let shadows = shadow::draw(graph, &handles, view, settings);
         // The emission of the objects is in the direct light already.
         let emission = graph.image("none", Format::RGBA16F, view.extent);
         graph.clear(emission, [0.0; 4]);
         let dark = GBuffer { emission, ..*gbuffer };
-        let choices = Direct { specular: settings.daylight.gloss, ..Direct::default() };
+        let choices = Direct { specular: gloss, ..Direct::default() };
         let lit = direct::light(graph, &dark, Lights::from(&shadows), &choices);
         graph.compute(added_lamps::Args { mask, lamps: lit.direct, direct }, view.extent);
         shadows.notes

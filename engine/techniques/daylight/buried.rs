@@ -50,7 +50,8 @@ impl Transport {
         let places = self.clear_places(plan, tile, wanted)?;
         let (moved, hits): (Vec<usize>, Vec<types::Hit>) =
             moved.into_iter().zip(places).filter_map(|(texel, place)| Some((texel, place?))).unzip();
-        let (there, shut) = self.gather(plan, first, &hits)?;
+        // Their paths are none of those of the texels of a tile.
+        let (there, shut) = self.gather(plan, plan.first_receiver(plan.tile_count() + tile), &hits)?;
         let clear = |number: &usize| !shut[*number].is_buried(samples, there.is_dark(*number, hits.len()));
         let taken: Vec<(usize, usize)> = (0..hits.len()).filter(clear).map(|number| (moved[number], number)).collect();
         taken.iter().for_each(|(texel, _)| buried[*texel] = false);

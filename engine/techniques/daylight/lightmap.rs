@@ -14,6 +14,8 @@ use crate::{
 
 /// Parts of a texel in which corners are stored.
 const PARTS: f32 = 16.0;
+/// Side of the blocks of texels whose triangles are listed.
+const BLOCK: u32 = 16;
 /// Largest side of a lightmap: positions of corners have 16 bits.
 pub const MOST_SIDE: u32 = 4092;
 
@@ -44,7 +46,7 @@ pub struct Unwrapped {
 pub struct TileTexels {
     /// The texels of each tile in the order of its rows: their numbers in the tile, and their surface points.
     pub tiles: Vec<Vec<(u32, types::Hit)>>,
-    /// The triangles that may touch each tile.
+    /// The triangles that may touch each block of [`BLOCK`] × [`BLOCK`] texels.
     triangles: Vec<Vec<u32>>,
     corners: Vec<[Vec2; 3]>,
     firsts: Vec<u32>,
@@ -154,11 +156,12 @@ impl Unwrapped {
             tiles[tile as usize].push((y % side * width + x % side, *hit));
         }
         let corners: Vec<[Vec2; 3]> = self.lightmap.corners.iter().map(|corners| position(*corners)).collect();
-        let mut triangles = vec![Vec::new(); tiles.len()];
+        let [columns, rows] = extent.map(|texels| texels.div_ceil(BLOCK));
+        let mut triangles = vec![Vec::new(); (columns * rows) as usize];
         for (triangle, corners) in corners.iter().enumerate() {
             let [across, down] = touched_by(corners);
-            for row in down.0 / side..=(down.1 / side).min(rows - 1) {
-                for column in across.0 / side..=(across.1 / side).min(columns - 1) {
+            for row in down.0 / BLOCK..=(down.1 / BLOCK).min(rows - 1) {
+                for column in across.0 / BLOCK..=(across.1 / BLOCK).min(columns - 1) {
                     triangles[(row * columns + column) as usize].push(triangle as u32);
                 }
             }
@@ -174,7 +177,8 @@ impl TileTexels {
         let first = [tile % columns * self.side, tile / columns * self.side];
         let width = self.side.min(self.extent[0] - first[0]);
         let at = [first[0] + texel % width, first[1] + texel / width];
-        let triangles = self.triangles.get(tile as usize).map_or(&[][..], Vec::as_slice);
+        let block = at[1] / BLOCK * self.extent[0].div_ceil(BLOCK) + at[0] / BLOCK;
+        let triangles = self.triangles.get(block as usize).map_or(&[][..], Vec::as_slice);
         let found = atlas::spread(&self.corners, triangles, at).into_iter();
         found.map(|(triangle, barycentrics)| hit_of(&self.firsts, triangle, barycentrics)).collect()
     }

@@ -225,8 +225,8 @@ pub struct Settings {
     /// How images of the bake that are in blocks reach a picture.
     pub blocks: Sampling,
     /// Direct light of the sun has highlights, and surfaces reflect as much of the baked light by their gloss as of light from everywhere alike. If
-    /// off, direct light is by Lambert's law alone, and metals reflect the baked light as diffuse surfaces of their colour. The baked light of a bake
-    /// with `diffuse_only` is reflected as if off.
+    /// off, direct light is by Lambert's law alone, and metals reflect the baked light as diffuse surfaces of their colour. A bake with
+    /// `diffuse_only` is shown as if off.
     pub gloss: bool,
     /// Haze of the air: 1 is clear mountain air, 10 is thick haze.
     #[schemars(range(min = 1, max = 10))]

@@ -374,8 +374,8 @@ impl Technique for Daylight {
         let view = &moment.view;
         let gbuffer = gbuffer::draw(graph, &handles, view, &settings.gbuffer);
         let shadows = shadow::draw(graph, &handles, view, &settings.shadow);
-        let choices = Direct { specular: of_day.gloss, ..Direct::default() };
         let gloss = of_day.gloss && !self.baked.stored.plan.settings.diffuse_only;
+        let choices = Direct { specular: gloss, ..Direct::default() };
         let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &choices);
         let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
         let [total, indirect, irradiance] =
@@ -439,7 +439,14 @@ impl Technique for Daylight {
             let groups = lamps::placed(moment.scene, &self.baked.stored.plan.lamps);
             let burn = added::burning(&moment.handles.moment.lights, groups, &burning);
             if !burn.is_empty() {
-                of_lamps = added::shine(graph, &handles, burn, (view, &gbuffer), [mask, lit.direct], settings);
+                of_lamps = added::shine(
+                    graph,
+                    &handles,
+                    burn,
+                    (view, &gbuffer),
+                    [mask, lit.direct],
+                    (&settings.shadow, gloss),
+                );
             }
             let moment = probes::Moment { weights: &linear, sun: light, patches: &patches, lamps: &burning };
             let tiles = self.baked.stored.probes.iter().map(|brick| &brick.light);

@@ -75,44 +75,43 @@ pub fn texels(atlas: &Atlas) -> Vec<Texel> {
 }
 
 /// Lists places of a covered texel where its light can be gathered, the nearest to its centre first: the points of its charts that are the
-/// nearest to a grid of [`GRID`] × [`GRID`] points in the texel. `triangles`: indices of all triangles that may touch the texel.
+/// nearest to a grid of [`GRID`] × [`GRID`] points in the texel, without those outside of the texel. `triangles`: indices of all triangles that may
+/// touch the texel.
 pub(in super::super) fn spread(corners: &[[Vec2; 3]], triangles: &[u32], [x, y]: [u32; 2]) -> Vec<(u32, [f32; 2])> {
-    let touches = |triangle: &&u32| {
-        let corners = &corners[**triangle as usize];
-        let rows = row_range(corners);
-        (rows.0..=rows.1).contains(&y) && {
+    let touches = |corners: &[Vec2; 3]| {
+        let [(left, right), (top, bottom)] = touched_by(corners);
+        (left..=right).contains(&x) && (top..=bottom).contains(&y) && {
             let (first, last) = columns(corners, y, u32::MAX);
             (first..=last).contains(&x)
         }
     };
     let near: Vec<(u32, [DVec2; 3])> = triangles
         .iter()
-        .filter(touches)
-        .map(|triangle| (*triangle, corners[*triangle as usize].map(|corner| corner.as_dvec2())))
+        .map(|triangle| (*triangle, &corners[*triangle as usize]))
+        .filter(|(_, corners)| touches(corners))
+        .map(|(triangle, corners)| (triangle, corners.map(|corner| corner.as_dvec2())))
         .collect();
-    let inner = |step: u32| (f64::from(step) + 0.5) / f64::from(GRID);
-    let mut points: Vec<DVec2> =
-        (0..GRID * GRID).map(|step| DVec2::new(inner(step % GRID), inner(step / GRID))).collect();
-    let off = |point: &DVec2| point.distance_squared(DVec2::splat(0.5));
-    points.sort_by(|a, b| off(a).total_cmp(&off(b)));
-    let mut found: Vec<(u32, [f32; 2])> = Vec::new();
-    for inside in points {
-        let point = DVec2::new(f64::from(x), f64::from(y)) + inside;
+    let corner = DVec2::new(f64::from(x), f64::from(y));
+    let step = |number: u32| (f64::from(number) + 0.5) / f64::from(GRID);
+    let mut found: Vec<(f64, u32, [f32; 2])> = Vec::new();
+    for point in (0..GRID * GRID).map(|i| corner + DVec2::new(step(i % GRID), step(i / GRID))) {
         let best = near
             .iter()
             .map(|(triangle, flat)| {
                 let (barycentric, distance) = nearest(flat, point);
-                (Rank { is_flat: is_flat(flat), distance, triangle: *triangle }, barycentric)
+                (Rank { is_flat: is_flat(flat), distance, triangle: *triangle }, barycentric, flat)
             })
             .reduce(|best, next| if next.0 < best.0 { next } else { best });
-        if let Some((rank, barycentric)) = best {
-            let place = (rank.triangle, barycentric);
-            if !found.contains(&place) {
-                found.push(place);
-            }
+        let Some((rank, [u, v], [a, b, c])) = best else { continue };
+        let inside = *a + (*b - *a) * f64::from(u) + (*c - *a) * f64::from(v) - corner;
+        let is_new = !found.iter().any(|(_, triangle, known)| (*triangle, *known) == (rank.triangle, [u, v]));
+        // Weights are rounded to 32 bits.
+        if is_new && inside.cmpge(DVec2::splat(-1e-5)).all() && inside.cmple(DVec2::splat(1.0 + 1e-5)).all() {
+            found.push((inside.distance_squared(DVec2::splat(0.5)), rank.triangle, [u, v]));
         }
     }
-    found
+    found.sort_by(|a, b| a.0.total_cmp(&b.0));
+    found.into_iter().map(|(_, triangle, barycentric)| (triangle, barycentric)).collect()
 }
 
 /// Whether a triangle has no area.
