@@ -46,8 +46,8 @@ fn lightmap_of(gpu: &Gpu, scene: &Scene, glowing: u32, settings: Baking) -> Bake
 }
 
 /// A lightmap whose lamps have the irradiance `of` a position and a normal.
-fn lightmap_with(gpu: &Gpu, scene: &Scene, glowing: u32, of: impl Fn(Vec3, Vec3) -> f32) -> Baked {
-    let (plan, unwrapped) = planned(scene, glowing, Baking { bounces: 1, tolerance: 0.002, ..baking(2) });
+fn lightmap_with(gpu: &Gpu, scene: &Scene, glowing: u32, settings: Baking, of: impl Fn(Vec3, Vec3) -> f32) -> Baked {
+    let (plan, unwrapped) = planned(scene, glowing, settings);
     let sources = Sources::Lightmap(Box::new(unwrapped.by_tile(plan.side())));
     let skies = units::skies(&plan).unwrap();
     let mut tiles = lights(gpu, scene, &plan, sources);
@@ -70,12 +70,17 @@ fn lamps_alone() -> PictureSettings {
 
 /// The pixels with an albedo of 0.5: their normals, and their irradiance by the lamps alone.
 fn seen(gpu: &Gpu, scene: &Scene, view: View, baked: &Baked) -> Vec<(Vec3, f32)> {
+    seen_at(gpu, scene, view, baked).into_iter().map(|(_, normal, irradiance)| (normal, irradiance)).collect()
+}
+
+/// The same with the number of each pixel.
+fn seen_at(gpu: &Gpu, scene: &Scene, view: View, baked: &Baked) -> Vec<(usize, Vec3, f32)> {
     let mut studio = Studio::with(gpu, scene.clone(), view, baked, &lamps_alone());
     let layers = studio.frame(0, &lamps_alone()).unwrap().0;
     let of = |name: &str| layers.layer(name).unwrap().rgb_pixels().unwrap();
     let (irradiance, albedo, normals) = (of("irradiance"), of("albedo"), of("normal"));
     let grey = (0..albedo.len()).filter(|pixel| (albedo[*pixel][1] - 0.5).abs() < 0.02);
-    grey.map(|pixel| (Vec3::from(normals[pixel]), irradiance[pixel][1])).collect()
+    grey.map(|pixel| (pixel, Vec3::from(normals[pixel]), irradiance[pixel][1])).collect()
 }
 
 /// A room of `size` metres that glows with a radiance of 1 around bodies whose albedo is 0.5.
@@ -130,7 +135,8 @@ fn every_pixel_finds_the_texels_of_its_own_surface() {
             let n = cube_turn().inverse() * normal;
             [n.x, -n.x, n.y, -n.y, n.z, -n.z].iter().position(|along| *along > 0.9).map(|face| 1.0 + face as f32)
         };
-        let baked = lightmap_with(gpu, &scene, lamp, |_, normal| face(normal).unwrap_or(20.0));
+        let settings = Baking { bounces: 1, tolerance: 0.002, ..baking(2) };
+        let baked = lightmap_with(gpu, &scene, lamp, settings, |_, normal| face(normal).unwrap_or(20.0));
         let mut faces = [0; 7];
         let mut wrong = 0;
         for camera in cameras() {
@@ -144,16 +150,41 @@ fn every_pixel_finds_the_texels_of_its_own_surface() {
         println!("cube: {wrong} of {} pixels have the light of another face", faces.iter().sum::<usize>());
         assert!(wrong <= 6, "{wrong}");
         assert!(faces[1..].iter().filter(|pixels| **pixels > 300).count() >= 5, "{faces:?}");
-        // Light that changes by up to 39 % along a metre. A chart ends within a texel of 0.125 m, and beyond its last texel the light stays the
-        // same, so up to half of a texel's change may be missing at a seam.
-        let (scene, lamp) = sphere();
+    });
+}
+
+#[test]
+fn seams_of_charts_are_invisible() {
+    with_gpu(|gpu| {
+        // Light that changes by up to 39 % along a metre, with charts that end within a texel of 0.125 m.
         let field = |p: Vec3| 2.0 + p.dot(vec3(0.6, -0.4, 0.3));
-        let baked = lightmap_with(gpu, &scene, lamp, |position, _| field(position));
-        for camera in cameras() {
-            let pixels = seen(gpu, &scene, camera, &baked);
-            let [least, most] = range(pixels.iter().map(|(normal, found)| found / field(0.8 * *normal)));
-            println!("sphere: {} pixels, {least:.4} to {most:.4}", pixels.len());
-            assert!(pixels.len() > 2000 && least > 0.975 && most < 1.025, "{least} to {most}");
+        type Find = fn(Vec3, Vec3, Vec3) -> Vec3;
+        let on_sphere: Find = |_, _, normal| 0.8 * normal;
+        let on_cube: Find = |eye, way, normal| eye + way * ((0.6 - eye.dot(normal)) / way.dot(normal));
+        for (name, (scene, lamp), at) in [("sphere", sphere(), on_sphere), ("cube", cube(), on_cube)] {
+            for filter in [0, Baking::default().filter] {
+                let settings = Baking { bounces: 1, tolerance: 0.002, filter, ..baking(2) };
+                let baked = lightmap_with(gpu, &scene, lamp, settings, |position, _| field(position));
+                for camera in cameras() {
+                    let world_from_clip = camera.clip_from_world.inverse();
+                    let mut ratios = vec![f32::NAN; 96 * 96];
+                    for (pixel, normal, found) in seen_at(gpu, &scene, camera, &baked) {
+                        let [x, y] = [pixel % 96, pixel / 96].map(|at| (at as f32 + 0.5) / 48.0 - 1.0);
+                        let way = world_from_clip.project_point3(vec3(x, -y, 0.5)) - camera.position;
+                        ratios[pixel] = found / field(at(camera.position, way, normal));
+                    }
+                    let there = |ratio: &&f32| ratio.is_finite();
+                    let [least, most] = range(ratios.iter().filter(there).copied());
+                    // Pixels beside each other, and above each other.
+                    let steps = [1, 96].map(|by| ratios.iter().zip(&ratios[by..]).map(|(a, b)| (a / b - 1.0).abs()));
+                    let step = steps.into_iter().flatten().filter(|step| step.is_finite()).fold(0.0, f32::max);
+                    let count = ratios.iter().filter(there).count();
+                    println!("{name}, filter {filter}: {count} pixels, {least:.4} to {most:.4}, steps to {step:.4}");
+                    assert!(count > 2000 && step < 0.01, "{name}, filter {filter}: {step}");
+                    let bias = if filter > 0 { 0.02 } else { 0.01 };
+                    assert!(least > 1.0 - bias && most < 1.0 + bias, "{name}, filter {filter}: {least} to {most}");
+                }
+            }
         }
     });
 }
@@ -309,10 +340,11 @@ fn the_floor_of_a_gap_that_is_narrower_than_a_texel_has_the_light_of_the_gap() {
 #[test]
 fn the_floor_of_a_gap_between_the_places_of_a_texel_is_not_black() {
     with_gpu(|gpu| {
-        // Places at odd eighths of a texel of 0.125 m are tried, and none is in the gap. The light is that of the floor beside the blocks.
+        // Places at odd eighths of a texel of 0.125 m are tried, and none is in the gap. The light continues that of the floor beside the blocks; that of the
+        // gap is 0.29 in the middle.
         let [least, mean] = beside_a_block(gpu, [-0.5, 0.02, 0.012, 0.015], 0.01, [false; 2]);
         println!("{mean:.3} of the open floor's light, at least {least:.3}");
-        assert!(least > 0.5, "{least}");
+        assert!(least > 0.4, "{least}");
     });
 }
 

@@ -126,10 +126,19 @@ export class Lightmaps {
                 });
             }
         }
-        // Texels in the padding show the nearest texel on a surface.
-        const out = new Float32Array(own.length);
-        this.sources.forEach((source, texel) => {
-            for (let channel = 0; channel < 3; ++channel) out[4 * texel + channel] = source < this.sources.length ? Math.max(own[4 * source + channel], 0) : 0;
+        // Texels in the padding show the nearest texel on a surface. Beside the charts of a lightmap they continue the light of the last two texels of a
+        // row or column.
+        const out = new Float32Array(own.length), { sources } = this, isCube = this.table.kind === 'cube';
+        const at = (texel, channel) => Math.max(own[4 * texel + channel], 0);
+        sources.forEach((source, texel) => {
+            const by = source - texel, far = source + by;
+            const beside = Math.abs(by) === width || (Math.abs(by) === 1 && Math.floor(source / width) === Math.floor(texel / width));
+            const continues = !isCube && beside && sources[far] === far;
+            for (let channel = 0; channel < 3; ++channel) {
+                const near = source < sources.length ? at(source, channel) : 0;
+                const beyond = () => Math.min(Math.max(2 * near - at(far, channel), near / 2), 2 * near);
+                out[4 * texel + channel] = continues ? beyond() : near;
+            }
             out[4 * texel + 3] = 1;
         });
         return out;

@@ -145,9 +145,19 @@ class Export:
                     own[y : y + height, x : x + width] += values * (coefficients[first + image] @ mixtures[layer["dimensions"]])
         own = np.maximum(own, 0).reshape(-1, 3)
         out = np.zeros_like(own)
-        there = self.sources.ravel() < len(own)
+        sources = self.sources.ravel().astype(np.int64)
+        there = np.flatnonzero(sources < len(own))
         # Texels in the padding show the nearest texel on a surface.
-        out[there] = own[self.sources.ravel()[there]]
+        out[there] = own[sources[there]]
+        if self.table.get("kind") != "cube":
+            # Beside the charts of a lightmap the padding continues the light of the last two texels of a row or column.
+            width, near = self.table["width"], sources[there]
+            by = near - there
+            beside = (np.abs(by) == width) | ((np.abs(by) == 1) & (near // width == there // width))
+            far = np.clip(near + by, 0, len(own) - 1)
+            beside &= (sources[far] == far) & (far == near + by)
+            there, near, far = there[beside], own[near[beside]], own[far[beside]]
+            out[there] = np.clip(2 * near - far, near / 2, 2 * near)
         return out.reshape(self.table["height"], self.table["width"], 3)
 
 

@@ -120,18 +120,56 @@ TexelLight mean(TexelLight sum) {
     return TexelLight(sum.first * scale, sum.second * scale, sum.rest * scale, sum.there);
 }
 
-// Bilinear between the texels that are on a surface. Texels of other charts are farther away than one texel.
+// The light of a texel of the lightmap; none beyond its borders.
+TexelLight lightmap_texel(ivec2 texel) {
+    if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(uvec2(texel), texels))) {
+        return TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+    }
+    return texel_light(uvec2(texel));
+}
+
+// The value beyond `near` on the line through `far`, at least half of `near` and at most twice as much.
+vec3 beyond(vec3 near, vec3 far) {
+    return clamp(2.0 * near - far, min(0.5 * near, 2.0 * near), max(0.5 * near, 2.0 * near));
+}
+
+// Adds the light of a corner that is on no surface, beyond the corner `near`. `by`: from it to `near`, texels.
+void add_beyond(inout TexelLight sum, TexelLight near, ivec2 texel, ivec2 by, float weight) {
+    if (near.there <= 0.0) return;
+    TexelLight far = lightmap_texel(texel + 2 * by);
+    if (far.there > 0.0) {
+        near.first = beyond(near.first, far.first);
+        near.second = beyond(near.second, far.second);
+        near.rest = beyond(near.rest, far.rest);
+    }
+    add(sum, near, weight);
+}
+
+// Bilinear between texels. Charts end between texels: the light of those beyond continues that of the last two, else a seam would be seen. Texels of
+// other charts are farther away than two texels.
 TexelLight lightmap_light(vec2 place) {
     vec2 corner = floor(place - 0.5);
     vec2 f = place - 0.5 - corner;
+    TexelLight lights[4];
     TexelLight sum = TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
     for (uint i = 0u; i < 4u; ++i) {
-        uvec2 step = uvec2(i & 1u, i >> 1u);
-        ivec2 texel = ivec2(corner) + ivec2(step);
-        if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(uvec2(texel), texels))) continue;
-        float weight = (step.x == 1u ? f.x : 1.0 - f.x) * (step.y == 1u ? f.y : 1.0 - f.y);
-        if (weight <= 0.0) continue;
-        add(sum, texel_light(uvec2(texel)), weight);
+        ivec2 step = ivec2(i & 1u, i >> 1u);
+        float weight = (step.x == 1 ? f.x : 1.0 - f.x) * (step.y == 1 ? f.y : 1.0 - f.y);
+        lights[i] = lightmap_texel(ivec2(corner) + step);
+        add(sum, lights[i], weight);
+    }
+    if (sum.there > 0.0 && sum.there < 0.999) {
+        for (uint i = 0u; i < 4u; ++i) {
+            if (lights[i].there > 0.0) continue;
+            ivec2 step = ivec2(i & 1u, i >> 1u);
+            ivec2 texel = ivec2(corner) + step;
+            float weight = (step.x == 1 ? f.x : 1.0 - f.x) * (step.y == 1 ? f.y : 1.0 - f.y);
+            TexelLight across = lights[i ^ 1u];
+            TexelLight down = lights[i ^ 2u];
+            float share = weight / max(across.there + down.there, 1.0);
+            add_beyond(sum, across, texel, ivec2(1 - 2 * step.x, 0), share);
+            add_beyond(sum, down, texel, ivec2(0, 1 - 2 * step.y), share);
+        }
     }
     if (sum.there < 1e-3) {
         // All four are buried, as in a gap between objects that is narrower than a texel. The texels around them belong to the same chart, for charts

@@ -8,7 +8,11 @@ use lucerna::{
     image::{self, Layers},
     scene::{Limits, LoadOptions, Scene, load},
     techniques::daylight::{
-        Baking, Calendar, Kind, Lit, Plan, Sky, Stored, Weather, digest, layer::Layer, lightmap, parts, units::Tile,
+        Baking, Calendar, Kind, Lit, Plan, Sky, Stored, Weather, digest,
+        layer::Layer,
+        lightmap::{self, Receiver},
+        parts,
+        units::Tile,
     },
 };
 use serde_json::{Value, json};
@@ -104,10 +108,10 @@ impl Lab {
         // The cap of the sky alone gives all of it; an overcast sky is grey.
         let along = irradiance / zenith[0];
         let [times, patches, _] = plan.dimensions();
-        let of_tile = |texels: &Vec<(u32, lucerna::shaders::types::Hit)>, number: usize| {
+        let of_tile = |texels: &[Receiver], number: usize| {
             let [_, _, columns, rows] = plan.tile(number as u32);
             let mut mask = vec![0u32; (columns * rows).div_ceil(32) as usize];
-            texels.iter().for_each(|(texel, _)| mask[*texel as usize / 32] |= 1 << (texel % 32));
+            texels.iter().for_each(|Receiver { texel, .. }| mask[*texel as usize / 32] |= 1 << (texel % 32));
             let one = u32::from(f16::ONE.to_bits());
             let mut table = vec![0.0; patches];
             table[144] = along;

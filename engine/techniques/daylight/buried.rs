@@ -38,11 +38,14 @@ impl Transport {
     pub(super) fn lightmap_tile(&mut self, plan: &Plan, tile: u32, mask: Vec<u32>) -> Result<Light> {
         let Sources::Lightmap(all) = &self.sources else { return Ok(Light { mask, ..Light::default() }) };
         let of_tile = all.tiles.get(tile as usize).map_or(&[][..], Vec::as_slice);
-        let (texels, hits): (Vec<u32>, Vec<types::Hit>) = of_tile.iter().copied().unzip();
+        let offsets: Vec<[f32; 2]> = of_tile.iter().map(|receiver| receiver.offset).collect();
+        let (texels, hits): (Vec<u32>, Vec<types::Hit>) =
+            of_tile.iter().map(|receiver| (receiver.texel, receiver.hit)).unzip();
         let first = plan.first_receiver(tile);
         let samples = plan.settings.samples;
         let count = hits.len();
         let (mut light, shut) = self.gather(plan, first, &hits)?;
+        light.spots.iter_mut().zip(offsets).for_each(|(spot, offset)| spot.offset = offset);
         let mut buried: Vec<bool> =
             (0..count).map(|texel| shut[texel].is_buried(samples, light.is_dark(texel, count))).collect();
         let moved: Vec<usize> = (0..count).filter(|texel| buried[*texel]).collect();

@@ -8,9 +8,12 @@
 
 use std::collections::BTreeMap;
 
+use glam::Vec3;
+
 use super::{
     Kind, Plan,
     gathered::{FEATURES, Features, Gathered},
+    listed::{Listed, Texel, dot},
 };
 
 /// Square of a difference in standard deviations of the noise that counts as noise.
@@ -19,29 +22,17 @@ const BY_NOISE: f32 = 2.0;
 const SHARP: f32 = 1.0;
 /// Relative difference of light that is never seen.
 const UNSEEN: f32 = 0.02;
+/// Number of texels in a mean over next neighbours, about: a Gaussian of 1 texel.
+const NEXT: f32 = 6.3;
+/// Change of light from texel to texel that is expected, relative.
+const CHANGE: f32 = 0.02;
 /// Least cosine between the normals of two texels of one surface.
 const LEAST_COSINE: f32 = 0.85;
 
-/// A texel of the whole bake.
-#[derive(Clone, Copy, Debug)]
-struct Texel {
-    tile: u32,
-    /// Among the tile's texels on surfaces.
-    number: u32,
-    column: u32,
-    row: u32,
-    position: [f32; 3],
-    normal: [f32; 3],
-    /// Distance to the next texels, metres.
-    size: f32,
-}
-
 /// The texels of a bake with what decides the weights between them.
 #[derive(Debug)]
-pub struct Filter {
-    texels: Vec<Texel>,
-    /// The first texel of each tile.
-    firsts: Vec<u32>,
+pub struct Filter<'a> {
+    listed: &'a Listed,
     near: Near,
     radius: f32,
     features: Vec<Features>,
@@ -53,37 +44,31 @@ pub struct Filter {
 #[derive(Debug)]
 enum Near {
     /// In the picture: the texel at each pixel.
-    Picture { columns: u32, rows: u32, at: Vec<u32> },
+    Picture,
     /// In space: texels by cells of this size.
     Space { cell: f32, cells: BTreeMap<[i32; 3], Vec<u32>> },
 }
 
-/// No texel.
-const NONE: u32 = u32::MAX;
-
-impl Filter {
-    /// Compares the light of all texels. `radius`: of the means, in texels.
-    pub fn new(plan: &Plan, tiles: &[Gathered], radius: u32) -> Self {
+impl<'a> Filter<'a> {
+    /// Compares the light of all texels. `listed`: those of the `tiles`; `radius`: of the means, in texels.
+    pub fn new(plan: &Plan, tiles: &[Gathered], listed: &'a Listed, radius: u32) -> Self {
         let radius = radius as f32;
-        let (mut texels, firsts, at) = listed(plan, tiles);
-        let [columns, rows] = plan.extent;
-        sizes(&mut texels, &at, plan.extent);
         let near = match plan.receivers {
-            Kind::View { .. } => Near::Picture { columns, rows, at },
-            _ => in_space(&texels, radius),
+            Kind::View { .. } => Near::Picture,
+            _ => in_space(&listed.texels, radius),
         };
         let features: Vec<Features> = tiles.iter().flat_map(|tile| tile.features.iter().copied()).collect();
         let variances = vec![[0.0; FEATURES]; features.len()];
-        let mut filter = Self { texels, firsts, near, radius, features, variances };
+        let mut filter = Self { listed, near, radius, features, variances };
         filter.smooth();
         filter
     }
 
     /// The neighbours of a texel on its surface within `radius` texels, itself among them, with their weight by distance. `falloff`: texels.
     fn each(&self, of: u32, radius: f32, falloff: f32, mut found: impl FnMut(u32, f32)) {
-        let texel = self.texels[of as usize];
+        let texel = self.listed.texels[of as usize];
         let mut consider = |other: u32, distance: f32| {
-            let q = &self.texels[other as usize];
+            let q = &self.listed.texels[other as usize];
             let way = [0, 1, 2].map(|i| q.position[i] - texel.position[i]);
             let cosine = dot(q.normal, texel.normal);
             let off = dot(way, texel.normal).abs();
@@ -101,17 +86,14 @@ impl Filter {
             );
         };
         match &self.near {
-            Near::Picture { columns, rows, at } => {
+            Near::Picture => {
                 let reach = radius as i64;
                 for dy in -reach..=reach {
                     for dx in -reach..=reach {
-                        let (x, y) = (i64::from(texel.column) + dx, i64::from(texel.row) + dy);
-                        if x < 0 || y < 0 || x >= i64::from(*columns) || y >= i64::from(*rows) {
-                            continue;
-                        }
-                        let other = at[(y * i64::from(*columns) + x) as usize];
                         let distance = ((dx * dx + dy * dy) as f32).sqrt();
-                        if other != NONE && distance <= radius {
+                        if let Some(other) = self.listed.beside(&texel, [dx, dy])
+                            && distance <= radius
+                        {
                             consider(other, distance);
                         }
                     }
@@ -123,7 +105,7 @@ impl Filter {
                 for x in low[0]..=high[0] {
                     for y in low[1]..=high[1] {
                         for &other in (low[2]..=high[2]).filter_map(|z| cells.get(&[x, y, z])).flatten() {
-                            let q = &self.texels[other as usize];
+                            let q = &self.listed.texels[other as usize];
                             let way = [0, 1, 2].map(|i| q.position[i] - texel.position[i]);
                             let distance = dot(way, way).sqrt();
                             if distance <= reach {
@@ -139,7 +121,7 @@ impl Filter {
     /// Means of the features over next neighbours, and their variances over more of them.
     fn smooth(&mut self) {
         let means = |radius: f32, falloff: f32, of: &dyn Fn(u32) -> Features| -> Vec<Features> {
-            (0..self.texels.len() as u32)
+            (0..self.listed.texels.len() as u32)
                 .map(|texel| {
                     let (mut sum, mut weights) = ([[0.0; FEATURES]; 2], 0.0);
                     self.each(texel, radius, falloff, |other, weight| {
@@ -181,83 +163,67 @@ impl Filter {
         (SHARP * (found - BY_NOISE)).max(0.0)
     }
 
-    /// The neighbours of a tile's texel: tile, number in it, and weights for the first and for the second half of the samples, each summing to 1.
-    pub fn weights(&self, tile: usize, number: usize) -> Vec<(usize, usize, [f32; 2])> {
-        let of = self.firsts[tile] + number as u32;
-        let mut out = Vec::new();
-        let mut sums = [0.0; 2];
+    /// The variance of the light of a texel in one half, relative.
+    fn noise(&self, of: u32) -> f32 {
+        let squares = |half: &[f32; FEATURES]| half.iter().map(|value| value * value).sum::<f32>();
+        let light: f32 = self.features[of as usize].iter().map(squares).sum::<f32>() / 2.0;
+        let variance: f32 = self.variances[of as usize].iter().sum();
+        // Those of the features are of means over next neighbours.
+        if variance > 0.0 { NEXT * variance / light.max(f32::MIN_POSITIVE) } else { 0.0 }
+    }
+
+    /// The neighbours of a texel, and their weights for the first and for the second half of the samples, each summing to 1.
+    pub fn weights(&self, of: u32) -> Vec<(u32, [f32; 2])> {
+        let texel = &self.listed.texels[of as usize];
+        let mut out: Vec<(u32, [f32; 2])> = Vec::new();
+        let mut ways = Vec::new();
+        let axes = tangents(texel.normal).map(|axis| axis.map(|of| of / texel.size.max(f32::MIN_POSITIVE)));
         self.each(of, self.radius, 0.5 * self.radius, |other, weight| {
             // The second half decides for the first, and the first for the second.
             let weights = [1, 0].map(|half| weight * (-self.difference(half, of, other)).exp());
             if weights.iter().any(|weight| *weight > 1e-4) {
-                sums.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += weight);
-                let q = &self.texels[other as usize];
-                out.push((q.tile as usize, q.number as usize, weights));
+                let q = &self.listed.texels[other as usize];
+                let way = [0, 1, 2].map(|i| q.position[i] - texel.position[i]);
+                ways.push(axes.map(|axis| dot(way, axis)));
+                out.push((other, weights));
             }
         });
-        out.iter_mut().for_each(|(_, _, weights)| {
-            weights.iter_mut().zip(sums).for_each(|(weight, sum)| *weight /= sum.max(f32::MIN_POSITIVE));
-        });
+        let noise = self.noise(of);
+        for half in 0..2 {
+            balance(out.iter_mut().map(|(_, weights)| &mut weights[half]), &ways, noise / CHANGE.powi(2));
+        }
         out
     }
 }
 
-fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+/// Two unit vectors that span the plane of a normal.
+fn tangents(normal: [f32; 3]) -> [[f32; 3]; 2] {
+    let (x, y) = Vec3::from(normal).normalize_or(Vec3::Z).any_orthonormal_pair();
+    [x.into(), y.into()]
+}
+
+/// Makes the sum of some weights 1, and moves their centre towards the texel: light that changes evenly keeps its value where most neighbours lie on
+/// one side. Balanced weights have more noise, so they are balanced as far as a change of the light is likelier than noise. `ways`: to the neighbours,
+/// texels; `noise`: the variance of their light by that of its change from texel to texel.
+fn balance<'a>(weights: impl Iterator<Item = &'a mut f32>, ways: &[[f32; 2]], noise: f32) {
+    let weights: Vec<&mut f32> = weights.collect();
+    let [mut x, mut y, mut xx, mut xy, mut yy] = [0.0f32; 5];
+    for (weight, [dx, dy]) in weights.iter().zip(ways) {
+        (x, y) = (x + **weight * dx, y + **weight * dy);
+        (xx, xy, yy) = (xx + **weight * dx * dx, xy + **weight * dx * dy, yy + **weight * dy * dy);
+    }
+    let (xx, yy) = (xx + noise, yy + noise);
+    let determinant = xx * yy - xy * xy;
+    // Without neighbours there is nothing to balance.
+    let by = if determinant > 0.0 { [yy * x - xy * y, xx * y - xy * x].map(|by| by / determinant) } else { [0.0; 2] };
+    let balanced: Vec<f32> =
+        weights.iter().zip(ways).map(|(weight, [dx, dy])| **weight * (1.0 - by[0] * dx - by[1] * dy)).collect();
+    let sum: f32 = balanced.iter().sum();
+    weights.into_iter().zip(balanced).for_each(|(weight, new)| *weight = new / sum.max(f32::MIN_POSITIVE));
 }
 
 fn cell_of(position: f32, cell: f32) -> i32 {
     (position / cell).floor().clamp(-1e9, 1e9) as i32
-}
-
-/// All texels, the first one of each tile, and the texel at each place of the bake.
-fn listed(plan: &Plan, tiles: &[Gathered]) -> (Vec<Texel>, Vec<u32>, Vec<u32>) {
-    let (mut texels, mut firsts) = (Vec::new(), Vec::new());
-    let mut at = vec![NONE; plan.extent[0] as usize * plan.extent[1] as usize];
-    for (tile, gathered) in tiles.iter().enumerate() {
-        firsts.push(texels.len() as u32);
-        let covered = plan.covered(tile as u32, &gathered.mask);
-        for (number, ([x, y], spot)) in covered.zip(&gathered.spots).enumerate() {
-            at[y as usize * plan.extent[0] as usize + x as usize] = texels.len() as u32;
-            texels.push(Texel {
-                tile: tile as u32,
-                number: number as u32,
-                column: x,
-                row: y,
-                position: spot.position,
-                normal: spot.normal,
-                size: 0.0,
-            });
-        }
-    }
-    (texels, firsts, at)
-}
-
-/// Sets the distance of each texel to its next neighbours in the bake. Texels without neighbours take the median of all.
-fn sizes(texels: &mut [Texel], at: &[u32], [columns, rows]: [u32; 2]) {
-    let next = |texel: &Texel, dx: i64, dy: i64| {
-        let (x, y) = (i64::from(texel.column) + dx, i64::from(texel.row) + dy);
-        let inside = x >= 0 && y >= 0 && x < i64::from(columns) && y < i64::from(rows);
-        inside.then(|| at[(y * i64::from(columns) + x) as usize]).filter(|other| *other != NONE)
-    };
-    let found: Vec<f32> = texels
-        .iter()
-        .map(|texel| {
-            let distance = |(dx, dy)| {
-                let other = &texels[next(texel, dx, dy)? as usize];
-                let way = [0, 1, 2].map(|i| other.position[i] - texel.position[i]);
-                Some(dot(way, way).sqrt()).filter(|distance| *distance > 0.0)
-            };
-            [(1, 0), (-1, 0), (0, 1), (0, -1)].into_iter().filter_map(distance).fold(f32::INFINITY, f32::min)
-        })
-        .collect();
-    let mut known: Vec<f32> = found.iter().copied().filter(|size| size.is_finite()).collect();
-    known.sort_by(f32::total_cmp);
-    let median = known.get(known.len() / 2).copied().unwrap_or(1.0);
-    // A neighbour in the bake may be far away on another surface, or very near in a narrow chart.
-    for (texel, size) in texels.iter_mut().zip(found) {
-        texel.size = if size.is_finite() { size.clamp(0.25 * median, 4.0 * median) } else { median };
-    }
 }
 
 fn in_space(texels: &[Texel], radius: f32) -> Near {

@@ -1,6 +1,9 @@
-//! From the gathered light of all tiles to the tiles of a file: filter and compression.
+//! From the gathered light of all tiles to the tiles of a file: filter, light at the centres of texels, and compression.
 
-use std::{collections::HashMap, thread};
+use std::{
+    collections::{BTreeMap, HashMap},
+    thread,
+};
 
 use super::{
     Plan, Texels,
@@ -8,6 +11,8 @@ use super::{
     columns::Measured,
     filter::Filter,
     gathered::Gathered,
+    listed::Listed,
+    rim,
     units::{self, Tile},
 };
 use crate::{Error, ErrorKind, Result};
@@ -22,13 +27,16 @@ const MOST_BYTES: u64 = 4 << 30;
 pub fn tiles(plan: &Plan, gathered: &[Gathered], mut told: impl FnMut(usize) -> Result<()>) -> Result<Vec<Tile>> {
     let skies = units::skies(plan)?;
     let radius = plan.settings.filter;
-    let filter =
-        (radius > 0 && gathered.iter().any(|tile| !tile.spots.is_empty())).then(|| Filter::new(plan, gathered, radius));
-    let filter = filter.as_ref();
+    let spots = || gathered.iter().flat_map(|tile| &tile.spots);
+    let listed = (radius > 0 && spots().next().is_some() || spots().any(|spot| spot.offset != [0.0; 2]))
+        .then(|| Listed::new(plan, gathered));
+    let filter = listed.as_ref().filter(|_| radius > 0).map(|listed| Filter::new(plan, gathered, listed, radius));
+    let mixing = listed.as_ref().map(|listed| Mixing { listed, filter: filter.as_ref() });
+    let mixing = mixing.as_ref();
     let mut out = Vec::with_capacity(gathered.len());
     let threads = thread::available_parallelism().map_or(1, usize::from).min(16);
     // Both halves of the texels around a tile, and their means: numbers of 32 bits.
-    let side = u64::from(plan.side() + 2 * radius);
+    let side = u64::from(plan.side() + 2 * (radius + rim::REACH as u32));
     let dimensions = plan.dimensions().into_iter().max().unwrap_or(1) as u64;
     let threads = threads.min((MOST_BYTES / (side * side * dimensions * 3 * 4 * 4).max(1)).max(1) as usize);
     for first in (0..gathered.len()).step_by(threads) {
@@ -36,7 +44,7 @@ pub fn tiles(plan: &Plan, gathered: &[Gathered], mut told: impl FnMut(usize) -> 
         let done: Vec<Result<Tile>> = thread::scope(|scope| {
             let skies = &skies;
             let handles: Vec<_> =
-                (first..last).map(|index| scope.spawn(move || tile(plan, gathered, filter, index, skies))).collect();
+                (first..last).map(|index| scope.spawn(move || tile(plan, gathered, mixing, index, skies))).collect();
             let lost = || Err(Error::new(ErrorKind::Runtime, "a thread that compresses a tile ended early"));
             handles.into_iter().map(|handle| handle.join().unwrap_or_else(|_| lost())).collect()
         });
@@ -49,15 +57,14 @@ pub fn tiles(plan: &Plan, gathered: &[Gathered], mut told: impl FnMut(usize) -> 
 }
 
 /// One tile.
-fn tile(plan: &Plan, gathered: &[Gathered], filter: Option<&Filter>, index: usize, skies: &[f32]) -> Result<Tile> {
+fn tile(plan: &Plan, gathered: &[Gathered], mixing: Option<&Mixing<'_>>, index: usize, skies: &[f32]) -> Result<Tile> {
     let dimensions = plan.dimensions();
     let columns = units::kinds(skies);
     let lit = &gathered[index];
     let [_, _, width, height] = plan.tile(index as u32);
     let layout = (plan.settings.format != Texels::Plain).then(|| Layout::new(&lit.mask, [width, height]));
     let mut layers = Vec::new();
-    let near: Option<Vec<_>> =
-        filter.map(|filter| (0..lit.spots.len()).map(|texel| filter.weights(index, texel)).collect());
+    let near = mixing.map(|mixing| (mixing.listed, mixing.of_tile(index)));
     let mut errors = Vec::new();
     for (which, columns) in columns.into_iter().enumerate() {
         let row = 3 * dimensions[which];
@@ -70,7 +77,7 @@ fn tile(plan: &Plan, gathered: &[Gathered], filter: Option<&Filter>, index: usiz
                     lit.layers[which].restore(texel, mean, noise);
                 }
             }
-            Some(near) => filtered(gathered, near, which, row, [&mut mean, &mut noise]),
+            Some((listed, near)) => mix(gathered, listed, near, (which, row), [&mut mean, &mut noise]),
         }
         let exact = !plan.settings.noise_floor;
         let measured = Measured { dimensions: dimensions[which], rows: &mean, noise: if exact { &[] } else { &noise } };
@@ -87,21 +94,58 @@ fn tile(plan: &Plan, gathered: &[Gathered], filter: Option<&Filter>, index: usiz
     Ok(Tile { sun, sky, lamps, mask: lit.mask.clone(), light: errors })
 }
 
-/// A neighbour of a texel: its tile, its number there, and its weights in the two halves of the samples.
-type Neighbour = (usize, usize, [f32; 2]);
+/// A neighbour of a texel in the whole bake, and its weights in the two halves of the samples.
+type Neighbour = (u32, [f32; 2]);
 
-/// Weighted means of the two halves of the samples, as mean and noise.
-fn filtered(gathered: &[Gathered], near: &[Vec<Neighbour>], which: usize, row: usize, out: [&mut Vec<f32>; 2]) {
+/// Whose light a texel shows.
+struct Mixing<'a> {
+    listed: &'a Listed,
+    filter: Option<&'a Filter<'a>>,
+}
+
+impl Mixing<'_> {
+    /// The neighbours of a texel whose mean is its light without noise.
+    fn filtered(&self, texel: u32) -> Vec<Neighbour> {
+        self.filter.map_or_else(|| vec![(texel, [1.0; 2])], |filter| filter.weights(texel))
+    }
+
+    /// The neighbours of all texels of a tile.
+    fn of_tile(&self, tile: usize) -> Vec<Vec<Neighbour>> {
+        let mut known: HashMap<u32, Vec<Neighbour>> = HashMap::new();
+        let near = self.listed.of_tile(tile).map(|texel| {
+            let Some(around) = rim::at_centre(self.listed, texel) else { return self.filtered(texel) };
+            let mut sum: BTreeMap<u32, [f32; 2]> = BTreeMap::new();
+            for (other, share) in around {
+                for (near, weights) in known.entry(other).or_insert_with(|| self.filtered(other)) {
+                    let sum = sum.entry(*near).or_default();
+                    sum.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += share * *weight);
+                }
+            }
+            sum.into_iter().collect()
+        });
+        near.collect()
+    }
+}
+
+/// Weighted means of the two halves of the samples, as mean and noise. `which`: the kind of light; `row`: numbers of a texel.
+fn mix(
+    gathered: &[Gathered],
+    listed: &Listed,
+    near: &[Vec<Neighbour>],
+    (which, row): (usize, usize),
+    out: [&mut Vec<f32>; 2],
+) {
     // The halves of the texels that are neighbours, each restored once.
-    let mut known: HashMap<(usize, usize), usize> = HashMap::new();
+    let mut known: HashMap<u32, usize> = HashMap::new();
     let mut halves: Vec<f32> = Vec::new();
     let mut noise = vec![0.0; row];
-    for &(tile, number, _) in near.iter().flatten() {
-        known.entry((tile, number)).or_insert_with(|| {
+    for &(texel, _) in near.iter().flatten() {
+        known.entry(texel).or_insert_with(|| {
             let at = halves.len();
             halves.resize(at + 2 * row, 0.0);
             let (first, second) = halves[at..].split_at_mut(row);
-            gathered[tile].layers[which].restore(number, first, &mut noise);
+            let of = &listed.texels[texel as usize];
+            gathered[of.tile as usize].layers[which].restore(of.number as usize, first, &mut noise);
             for ((first, second), noise) in first.iter_mut().zip(second).zip(&noise) {
                 (*first, *second) = (*first + noise, *first - noise);
             }
@@ -115,8 +159,8 @@ fn filtered(gathered: &[Gathered], near: &[Vec<Neighbour>], which: usize, row: u
     {
         first.fill(0.0);
         second.fill(0.0);
-        for (tile, number, [a, b]) in near {
-            let Some(&at) = known.get(&(*tile, *number)) else { continue };
+        for (texel, [a, b]) in near {
+            let Some(&at) = known.get(texel) else { continue };
             first.iter_mut().zip(&halves[at..at + row]).for_each(|(sum, value)| *sum += a * value);
             second.iter_mut().zip(&halves[at + row..at + 2 * row]).for_each(|(sum, value)| *sum += b * value);
         }

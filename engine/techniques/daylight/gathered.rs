@@ -33,6 +33,9 @@ pub struct Spot {
     pub position: [f32; 3],
     /// Unit normal of the side that receives light.
     pub normal: [f32; 3],
+    /// From the centre of the texel to the position, texels: not 0 where the centre is outside of its chart. Texels of a picture have their
+    /// light at their centres, and a texel that was moved because it is buried keeps the light of its place.
+    pub offset: [f32; 2],
 }
 
 /// A tile of a bake as its unit keeps it.
@@ -225,7 +228,7 @@ impl Gathered {
         word(&mut out, self.mask.len());
         self.mask.iter().for_each(|word| out.extend_from_slice(&word.to_le_bytes()));
         for spot in &self.spots {
-            let numbers = spot.position.iter().chain(&spot.normal);
+            let numbers = spot.position.iter().chain(&spot.normal).chain(&spot.offset);
             numbers.for_each(|value| out.extend_from_slice(&value.to_le_bytes()));
         }
         let features = self.features.iter().flatten().flatten();
@@ -257,10 +260,14 @@ impl Gathered {
             let mut number = || rest.float();
             let position = [number()?, number()?, number()?];
             let normal = [number()?, number()?, number()?];
+            let offset = [number()?, number()?];
             if !position.iter().chain(&normal).all(|value| value.is_finite()) {
                 return Err(Error::input("a surface that is not finite"));
             }
-            spots.push(Spot { position, normal });
+            if !offset.iter().all(|value| value.abs() <= 1.0) {
+                return Err(Error::input("light from outside of its texel"));
+            }
+            spots.push(Spot { position, normal, offset });
         }
         let mut features = vec![[[0.0; FEATURES]; 2]; there as usize];
         for value in features.iter_mut().flatten().flatten() {

@@ -4,7 +4,7 @@ use glam::Vec2;
 
 use super::{
     Baking,
-    atlas::{self, Atlas, Instance, MeshInput, texels, touched_by},
+    atlas::{self, Atlas, Instance, MeshInput, Texel, texels, touched_by},
 };
 use crate::{
     Error, Result,
@@ -33,19 +33,30 @@ pub struct Lightmap {
 pub struct Unwrapped {
     pub lightmap: Lightmap,
     pub charts: u32,
-    /// The surface point of each covered texel, in the order of rows: its column and row, and the point.
-    pub receivers: Vec<([u32; 2], types::Hit)>,
+    /// The covered texels in the order of rows, each with its surface point.
+    pub receivers: Vec<(Texel, types::Hit)>,
     /// The number of the first triangle of each instance, and of all triangles.
     firsts: Vec<u32>,
     /// Meshes that took a fallback, in whole sentences.
     pub notes: Vec<String>,
 }
 
+/// A texel of a tile of a lightmap.
+#[derive(Clone, Copy, Debug)]
+pub struct Receiver {
+    /// Its number in the tile.
+    pub texel: u32,
+    /// Its surface point: the centre, or the nearest point of its chart.
+    pub hit: types::Hit,
+    /// From the centre to that point, texels.
+    pub offset: [f32; 2],
+}
+
 /// The texels of the tiles of a lightmap.
 #[derive(Clone, Debug)]
 pub struct TileTexels {
-    /// The texels of each tile in the order of its rows: their numbers in the tile, and their surface points.
-    pub tiles: Vec<Vec<(u32, types::Hit)>>,
+    /// The texels of each tile in the order of its rows.
+    pub tiles: Vec<Vec<Receiver>>,
     /// The triangles that may touch each block of [`BLOCK`] × [`BLOCK`] texels.
     triangles: Vec<Vec<u32>>,
     corners: Vec<[Vec2; 3]>,
@@ -119,10 +130,8 @@ pub fn unwrap(scene: &Scene, settings: &Baking) -> Result<Unwrapped> {
     for count in counts {
         firsts.push(firsts.last().copied().unwrap_or(0) + count);
     }
-    let receivers = texels(&rounded)
-        .into_iter()
-        .map(|texel| ([texel.x, texel.y], hit_of(&firsts, texel.triangle, texel.barycentric)))
-        .collect();
+    let receivers =
+        texels(&rounded).into_iter().map(|texel| (texel, hit_of(&firsts, texel.triangle, texel.barycentric))).collect();
     Ok(Unwrapped {
         lightmap: Lightmap { extent: [rounded.width, rounded.height], corners },
         charts: rounded.charts,
@@ -150,10 +159,11 @@ impl Unwrapped {
         let extent = self.lightmap.extent;
         let [columns, rows] = extent.map(|texels| texels.div_ceil(side));
         let mut tiles = vec![Vec::new(); (columns * rows) as usize];
-        for ([x, y], hit) in &self.receivers {
+        for (Texel { x, y, offset, .. }, hit) in &self.receivers {
             let tile = y / side * columns + x / side;
             let width = side.min(extent[0] - x / side * side);
-            tiles[tile as usize].push((y % side * width + x % side, *hit));
+            let texel = y % side * width + x % side;
+            tiles[tile as usize].push(Receiver { texel, hit: *hit, offset: *offset });
         }
         let corners: Vec<[Vec2; 3]> = self.lightmap.corners.iter().map(|corners| position(*corners)).collect();
         let [columns, rows] = extent.map(|texels| texels.div_ceil(BLOCK));

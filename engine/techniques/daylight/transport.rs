@@ -157,7 +157,7 @@ impl Transport {
             Sources::Lightmap(texels) => {
                 let tiles = &texels.tiles;
                 let every = tiles.iter().map(Vec::len).sum::<usize>().div_ceil(SPARSE).max(1);
-                let hits: Vec<_> = tiles.iter().flatten().step_by(every).map(|(_, hit)| *hit).collect();
+                let hits: Vec<_> = tiles.iter().flatten().step_by(every).map(|receiver| receiver.hit).collect();
                 (hits, Vec::new(), None)
             }
             Sources::View(_) | Sources::Cube(_) => {
@@ -386,7 +386,7 @@ impl Transport {
             let [sun, sky, lamps, spots, shut] =
                 [sun_sums, sky_sums, lamp_sums, spots, shut].map(|buffer| graph.read_buffer(buffer));
             let frame = self.run(&graph)?;
-            let spot = |spot: types::DaySpot| Spot { position: spot.position, normal: spot.normal };
+            let spot = |spot: types::DaySpot| Spot { position: spot.position, normal: spot.normal, offset: [0.0; 2] };
             let spots = frame.buffer(spots).into_iter().map(spot).collect();
             let mut light = Light { spots, ..Light::default() };
             [light.sun, light.noise] = summed(&frame.buffer(sun), [count, times, samples]);

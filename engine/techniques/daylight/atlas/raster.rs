@@ -5,7 +5,7 @@ use glam::{DVec2, Vec2};
 use super::Atlas;
 
 /// A texel that a chart covers.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Texel {
     /// The column.
     pub x: u32,
@@ -17,6 +17,8 @@ pub struct Texel {
     ///
     /// If the centre lies outside the triangle, they belong to the nearest point of the triangle.
     pub barycentric: [f32; 2],
+    /// From the texel centre to that point, texels.
+    pub offset: [f32; 2],
 }
 
 /// What makes one triangle the better choice for a texel: a smaller value wins.
@@ -66,7 +68,12 @@ pub fn texels(atlas: &Atlas) -> Vec<Texel> {
         if first <= last {
             for x in first..=last {
                 if let Some((rank, barycentric)) = best[x as usize].take() {
-                    result.push(Texel { x, y, triangle: rank.triangle, barycentric });
+                    let centre = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+                    let corners = atlas.corners[rank.triangle as usize].map(|corner| corner.as_dvec2());
+                    let inside = rank.distance == 0.0;
+                    let offset = if inside { DVec2::ZERO } else { point(&corners, barycentric) - centre };
+                    let offset = offset.as_vec2().to_array();
+                    result.push(Texel { x, y, triangle: rank.triangle, barycentric, offset });
                 }
             }
         }
@@ -102,12 +109,12 @@ pub(in super::super) fn spread(corners: &[[Vec2; 3]], triangles: &[u32], [x, y]:
                 (Rank { is_flat: is_flat(flat), distance, triangle: *triangle }, barycentric, flat)
             })
             .reduce(|best, next| if next.0 < best.0 { next } else { best });
-        let Some((rank, [u, v], [a, b, c])) = best else { continue };
-        let inside = *a + (*b - *a) * f64::from(u) + (*c - *a) * f64::from(v) - corner;
-        let is_new = !found.iter().any(|(_, triangle, known)| (*triangle, *known) == (rank.triangle, [u, v]));
+        let Some((rank, weights, flat)) = best else { continue };
+        let inside = self::point(flat, weights) - corner;
+        let is_new = !found.iter().any(|(_, triangle, known)| (*triangle, *known) == (rank.triangle, weights));
         // Weights are rounded to 32 bits.
         if is_new && inside.cmpge(DVec2::splat(-1e-5)).all() && inside.cmple(DVec2::splat(1.0 + 1e-5)).all() {
-            found.push((inside.distance_squared(DVec2::splat(0.5)), rank.triangle, [u, v]));
+            found.push((inside.distance_squared(DVec2::splat(0.5)), rank.triangle, weights));
         }
     }
     found.sort_by(|a, b| a.0.total_cmp(&b.0));
@@ -190,6 +197,11 @@ fn columns(corners: &[Vec2; 3], row: u32, width: u32) -> (u32, u32) {
     }
     let (first, last) = touched(left, right);
     (first.min(width - 1), last.min(width - 1))
+}
+
+/// Gives the point of a triangle with these weights of corner 1 and corner 2.
+fn point([a, b, c]: &[DVec2; 3], [u, v]: [f32; 2]) -> DVec2 {
+    *a + (*b - *a) * f64::from(u) + (*c - *a) * f64::from(v)
 }
 
 /// Gives the weights of the nearest point of a triangle, and the squared distance to it.

@@ -64,8 +64,8 @@ pub fn irradiance(stored: &Stored, moment: &Moment) -> Vec<[f32; 3]> {
     out
 }
 
-/// For each texel the texel whose light it shows: itself on a surface; the nearest one on a surface in the padding around charts, so that
-/// bilinear filtering finds no dark texels; [`NOWHERE`] elsewhere. Numbers are row · width + column. The faces of a cube are padded each by itself.
+/// For each texel the source of its light: itself on a surface; the nearest one on a surface in the padding around charts, so that bilinear
+/// filtering finds no dark texels; [`NOWHERE`] elsewhere. Numbers are row · width + column. The faces of a cube are padded each by itself.
 pub fn sources(stored: &Stored) -> Vec<u32> {
     let [width, height] = stored.plan.extent;
     let side = match stored.plan.receivers {
@@ -76,7 +76,7 @@ pub fn sources(stored: &Stored) -> Vec<u32> {
     let mut out = vec![NOWHERE; width as usize * height as usize];
     for (number, tile) in stored.tiles.iter().enumerate() {
         for [x, y] in stored.plan.covered(number as u32, &tile.mask) {
-            parts[(x / side) as usize].push(Texel { x: x % side, y, triangle: 0, barycentric: [0.0; 2] });
+            parts[(x / side) as usize].push(Texel { x: x % side, y, ..Texel::default() });
             out[(y * width + x) as usize] = y * width + x;
         }
     }
@@ -110,9 +110,22 @@ pub fn faces(light: &[[f32; 3]], sources: &[u32], side: u32) -> Vec<(Vec<[f32; 3
     (0..FACES).map(face).collect()
 }
 
-/// The light with its padding filled.
-pub fn filled(light: &[[f32; 3]], sources: &[u32]) -> Vec<[f32; 3]> {
-    sources.iter().map(|source| light.get(*source as usize).copied().unwrap_or_default()).collect()
+/// The light with its padding filled. `width`: of a lightmap. The padding beside the texels of its charts continues the light of the last two of a row or
+/// column, as pictures do; everything else shows the light of its source.
+pub fn filled(light: &[[f32; 3]], sources: &[u32], width: Option<u32>) -> Vec<[f32; 3]> {
+    let there = |source: u32| light.get(source as usize).copied();
+    let shown = |(texel, source): (usize, &u32)| {
+        let near = there(*source)?;
+        let by = i64::from(*source) - texel as i64;
+        let beside = width.is_some_and(|width| {
+            let is_next = by.abs() == 1 && source / width == texel as u32 / width;
+            is_next || by.abs() == i64::from(width) && width > 1
+        });
+        let far = u32::try_from(i64::from(*source) + by).ok().filter(|far| sources.get(*far as usize) == Some(far));
+        let Some(far) = far.filter(|_| beside).and_then(there) else { return Some(near) };
+        Some(std::array::from_fn(|i| (2.0 * near[i] - far[i]).clamp(0.5 * near[i], 2.0 * near[i])))
+    };
+    sources.iter().enumerate().map(|of| shown(of).unwrap_or_default()).collect()
 }
 
 /// The levels of an image, the largest first.
@@ -126,7 +139,7 @@ pub struct Levels {
 /// Charts lie on blocks of 4×4 texels with as much between them: levels 1 and 2 mix no charts, smaller levels do.
 pub fn levels(light: &[[f32; 3]], sources: &[u32], extent: [u32; 2]) -> Levels {
     // Texels that have no light count only where no other is.
-    let mut level: Vec<[f32; 4]> = filled(light, sources)
+    let mut level: Vec<[f32; 4]> = filled(light, sources, Some(extent[0]))
         .iter()
         .zip(sources)
         .map(|([r, g, b], source)| [*r, *g, *b, if *source == NOWHERE { 0.0 } else { 1.0 }])
@@ -179,6 +192,31 @@ impl Levels {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn padding_beside_a_chart_continues_its_light() {
+        // Two rows of five texels. Surfaces: the second and third texel of the first row, and the first of the second row.
+        let light = [
+            [0.0; 3],
+            [1.0, 3.0, 2.0],
+            [1.5, 1.0, 2.0],
+            [0.0; 3],
+            [0.0; 3],
+            [4.0; 3],
+            [0.0; 3],
+            [0.0; 3],
+            [0.0; 3],
+            [0.0; 3],
+        ];
+        let sources = [1, 1, 2, 2, 2, 5, 1, 2, 2, 5];
+        let shown = filled(&light, &sources, Some(5));
+        // 2 · 1 - 1.5; 2 · 3 - 1; 2 · 2 - 2, and the other way round 2 · 1.5 - 1; 2 · 1 - 3, but at least half; 2 · 2 - 2.
+        assert_eq!([shown[0], shown[3]], [[0.5, 5.0, 2.0], [2.0, 0.5, 2.0]]);
+        // Two texels away, with one texel on a surface only, in a diagonal, and at the end of the row before.
+        assert_eq!([shown[4], shown[6], shown[8], shown[9]], [light[2], light[1], light[2], light[5]]);
+        assert_eq!(shown[1..3], light[1..3]);
+        assert_eq!(filled(&light, &sources, None)[0], light[1]);
+    }
 
     #[test]
     fn levels_are_means_of_the_texels_with_light() {

@@ -38,7 +38,9 @@ impl Writer<'_> {
         entry: &mut Value,
     ) -> Result<()> {
         let light = export::irradiance(self.stored, moment);
-        let layers = self.pixels(&export::filled(&light, self.sources), clock, date);
+        let is_lightmap = matches!(self.stored.plan.receivers, Kind::Lightmap { .. });
+        let width = is_lightmap.then_some(self.stored.plan.extent[0]);
+        let layers = self.pixels(&export::filled(&light, self.sources, width), clock, date);
         let encoded = |format| image::encode(format, &layers, &WriteOptions::default()).map(|(bytes, _)| bytes);
         let exr = format!("lightmap-{}.exr", clock.name);
         folder.write(exr.clone(), &encoded(Format::Exr)?)?;
