@@ -24,8 +24,9 @@ pub fn at_centre(listed: &Listed, of: u32) -> Option<Vec<(u32, f32)>> {
     for way in (-REACH..=REACH).flat_map(|row| (-REACH..=REACH).map(move |column| [column, row])) {
         let Some(other) = listed.beside(texel, way).filter(|other| *other != of) else { continue };
         let q = &listed.texels[other as usize];
+        let cosine = dot(q.normal, texel.normal);
         // A degenerate triangle has no normal.
-        if !(dot(q.normal, texel.normal) >= LEAST_COSINE) {
+        if cosine.is_nan() || cosine < LEAST_COSINE {
             continue;
         }
         let [dx, dy] = [way[0] as f32 + q.offset[0] - x, way[1] as f32 + q.offset[1] - y];
