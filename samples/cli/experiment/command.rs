@@ -12,13 +12,13 @@ use serde_json::json;
 use super::{
     analysis::{self, papers},
     cache::Cache,
-    file::{self, BUILTIN},
+    file::{self, BUILTIN, Narrowed},
     place::Folders,
     results::Results,
     run::{self, Context, Planned, Rendered, Stopped},
 };
 use crate::{
-    args::{DeviceArgs, TalkArgs},
+    args::{DeviceArgs, Size, TalkArgs},
     bake,
     console::{self, Console},
     program::STOPPED_EARLY,
@@ -38,6 +38,14 @@ pub struct ReproduceArgs {
     /// Quick mode: fewer views, smaller pictures or fewer samples, as the experiment defines
     #[arg(long)]
     pub quick: bool,
+
+    /// Size of all pictures, instead of those of the experiment
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+
+    /// Only this scene of the experiment; may be repeated
+    #[arg(long, value_name = "NAME")]
+    pub scene: Vec<String>,
 
     /// Folder for the report and the pictures; existing pictures are not rendered again [default: NAME-report]
     #[arg(short, long, value_name = "DIR")]
@@ -116,6 +124,10 @@ fn all(args: &ReproduceArgs, console: Console) -> Result<ExitCode> {
         let help = "Run `lucerna reproduce NAME --json` for each experiment, or read report.json of the folder";
         return Err(Error::usage("`reproduce all` prints no JSON document").help(help));
     }
+    if !args.scene.is_empty() {
+        let help = "Run `lucerna reproduce NAME --scene SCENE` for the experiment that has the scene";
+        return Err(Error::usage("`reproduce all` takes no --scene: experiments have scenes of their own").help(help));
+    }
     papers::check()?;
     let begun = Instant::now();
     let quick = if args.quick { "-quick" } else { "" };
@@ -158,7 +170,8 @@ fn summary(folder: &Path, console: Console, as_json: bool) -> Result<()> {
 
 fn one(args: &ReproduceArgs, asked: &str, console: Console) -> Result<ExitCode> {
     let begun = Instant::now();
-    let experiment = file::open(asked, args.quick)?;
+    let narrowed = Narrowed::new(args.size, &args.scene);
+    let experiment = file::open(asked, args.quick)?.narrow(&narrowed)?;
     let interrupt = Interrupt::install();
     let quick = if args.quick { "-quick" } else { "" };
     let folder = args.output.clone().unwrap_or_else(|| PathBuf::from(format!("{}{quick}-report", experiment.name)));
@@ -171,7 +184,11 @@ fn one(args: &ReproduceArgs, asked: &str, console: Console) -> Result<ExitCode> 
         console,
         progress: args.progress,
         interrupt: &interrupt,
-        command: format!("lucerna reproduce {asked}{}", if args.quick { " --quick" } else { "" }),
+        command: ["lucerna reproduce", asked, if args.quick { "--quick" } else { "" }, &narrowed.to_string()]
+            .into_iter()
+            .filter(|part| !part.is_empty())
+            .collect::<Vec<_>>()
+            .join(" "),
         shard: args.shard,
         until: args.time_limit.map(|limit| begun + limit.0),
         dry: args.dry_run,

@@ -14,7 +14,7 @@ use serde_json::{Map, Value, json};
 use super::{
     cache::{self, Cache},
     digest::Digest,
-    file::{self, Changes, Experiment, Role},
+    file::{self, Changes, Experiment, Narrowed, Role},
     kinds::Times,
 };
 use crate::{config, report};
@@ -104,6 +104,8 @@ pub(super) struct Manifest {
     pub name: String,
     pub path: Option<PathBuf>,
     pub quick: bool,
+    #[serde(default, skip_serializing_if = "Narrowed::is_empty")]
+    pub narrowed: Narrowed,
     pub text: String,
     pub runs: Vec<Done>,
     pub skipped: Vec<(String, String)>,
@@ -145,14 +147,14 @@ impl Results {
         let text = lucerna::image::read_file_checked(&manifest_path, 1 << 28).map_err(fail)?;
         let manifest: Manifest = serde_json::from_slice(&text)
             .map_err(|error| fail(Error::input(error.to_string()).in_file(&manifest_path)))?;
-        let Manifest { name, path, quick, text, runs, skipped, missing, facts } = manifest;
+        let Manifest { name, path, quick, narrowed, text, runs, skipped, missing, facts } = manifest;
         // Keys are used as file names in this folder, so they are checked.
         if let Some(run) = runs.iter().find(|run| !Digest::is_hex(&run.key)) {
             return Err(fail(
                 Error::input(format!("{:?} is no key of a picture", run.key)).at("runs").in_file(&manifest_path),
             ));
         }
-        let experiment = file::parse(&name, path.as_deref(), &text, quick)?;
+        let experiment = file::parse(&name, path.as_deref(), &text, quick)?.narrow(&narrowed)?;
         Ok(Self { experiment, runs, skipped, missing, facts, cache: Cache::open(folder) })
     }
 
@@ -161,6 +163,7 @@ impl Results {
             name: self.experiment.name.clone(),
             path: self.experiment.path.clone(),
             quick: self.experiment.quick,
+            narrowed: self.experiment.narrowed.clone(),
             text: self.experiment.text.clone(),
             runs: self.runs.clone(),
             skipped: self.skipped.clone(),

@@ -333,6 +333,9 @@ fn facts(experiment: &Experiment, context: &Context<'_>) -> Vec<(String, String)
         ("Mode", if experiment.quick { "quick".into() } else { "full".into() }),
     ];
     let mut facts: Vec<(String, String)> = facts.map(|(name, value)| (name.to_owned(), value)).to_vec();
+    if !experiment.narrowed.is_empty() {
+        facts.push(("Part".into(), experiment.narrowed.to_string()));
+    }
     for method in &experiment.methods {
         let mut changes = config::to_value(&method.settings).unwrap_or_default().to_string();
         if method.paper {

@@ -65,6 +65,9 @@ pub fn report(results: &Results) -> Result<Page> {
         page.warnings
             .push("Quick mode: fewer views, smaller pictures or fewer samples than the experiment proper.".into());
     }
+    if !experiment.narrowed.is_empty() {
+        page.warnings.push(format!("A part of the experiment, chosen by {}.", experiment.narrowed));
+    }
     if results.missing > 0 {
         let (there, missing) = (results.runs.len(), results.missing);
         page.warnings.push(format!(

@@ -28,6 +28,7 @@
 //! size = "32x24"
 //! ```
 
+mod narrow;
 mod read;
 
 use std::{
@@ -35,6 +36,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
+pub use narrow::Narrowed;
 pub use read::parse;
 
 use lucerna::{Error, Result};
@@ -74,6 +76,8 @@ pub struct Experiment {
     /// The file, for error messages and for files next to it; `None` for a built-in experiment.
     pub path: Option<PathBuf>,
     pub quick: bool,
+    /// The part of it that was asked for.
+    pub narrowed: Narrowed,
     pub title: String,
     pub summary: String,
     pub analysis: String,

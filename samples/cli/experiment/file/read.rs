@@ -10,7 +10,7 @@ use serde::Deserialize;
 use serde_json::Value;
 use toml::Spanned;
 
-use super::{Changes, Experiment, Method, Role, Scene};
+use super::{Changes, Experiment, Method, Narrowed, Role, Scene};
 use crate::{
     args::Size,
     experiment::{analysis, kinds, results},
@@ -114,6 +114,7 @@ pub fn parse(name: &str, path: Option<&Path>, text: &str, quick: bool) -> Result
         name: name.to_owned(),
         path: path.map(Path::to_path_buf),
         quick,
+        narrowed: Narrowed::default(),
         title: raw.title,
         summary: raw.summary,
         size: size(&raw.size)?,

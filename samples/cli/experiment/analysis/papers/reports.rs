@@ -143,7 +143,8 @@ impl Report {
         let Some(facts) = self.data.first().and_then(|data| data["facts"].as_object()) else { return };
         self.facts =
             facts.iter().filter_map(|(name, value)| Some((name.clone(), value.as_str()?.to_owned()))).collect();
-        self.quick = self.fact("Mode") == "quick";
+        // A part is judged as the quick mode is: it may lack cells of the whole experiment.
+        self.quick = self.fact("Mode") == "quick" || !self.fact("Part").is_empty();
     }
 
     /// A fact by its name.
