@@ -60,6 +60,8 @@ struct TexelLight {
     float there;  // 1; 0 where no surface is
 };
 
+const TexelLight NO_LIGHT = TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+
 uint fetched = 0u;
 
 // Adds a layer at a texel: its images in words, then those in blocks.
@@ -83,7 +85,7 @@ TexelLight texel_light(uvec2 texel) {
     uint number = tile.y * columns + tile.x;
     uvec2 inside = texel - tile * side;
     uint at = day_texel(number, inside);
-    if (at == NONE) return TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+    if (at == NONE) return NO_LIGHT;
     DaySums of_sun = DaySums(vec3(0.0), vec3(0.0), 0u);
     if (FRAMES == 0u) {
         add_layer(of_sun, number, 0u, at, inside, LOGARITHMS != 0u ? second : 0u);
@@ -122,10 +124,8 @@ TexelLight mean(TexelLight sum) {
 
 // The light of a texel of the lightmap; none beyond its borders.
 TexelLight lightmap_texel(ivec2 texel) {
-    if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(uvec2(texel), texels))) {
-        return TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
-    }
-    return texel_light(uvec2(texel));
+    bool inside = all(greaterThanEqual(texel, ivec2(0))) && all(lessThan(uvec2(texel), texels));
+    return inside ? texel_light(uvec2(texel)) : NO_LIGHT;
 }
 
 // The value beyond `near` on the line through `far`, at least half of `near` and at most twice as much.
@@ -150,37 +150,35 @@ void add_beyond(inout TexelLight sum, TexelLight near, ivec2 texel, ivec2 by, fl
 TexelLight lightmap_light(vec2 place) {
     vec2 corner = floor(place - 0.5);
     vec2 f = place - 0.5 - corner;
+    float weights[4] = { (1.0 - f.x) * (1.0 - f.y), f.x * (1.0 - f.y), (1.0 - f.x) * f.y, f.x * f.y };
     TexelLight lights[4];
-    TexelLight sum = TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+    TexelLight sum = NO_LIGHT;
+    float there = 0.0;
     for (uint i = 0u; i < 4u; ++i) {
-        ivec2 step = ivec2(i & 1u, i >> 1u);
-        float weight = (step.x == 1 ? f.x : 1.0 - f.x) * (step.y == 1 ? f.y : 1.0 - f.y);
-        lights[i] = lightmap_texel(ivec2(corner) + step);
-        add(sum, lights[i], weight);
+        lights[i] = lightmap_texel(ivec2(corner) + ivec2(i & 1u, i >> 1u));
+        there += lights[i].there;
+        add(sum, lights[i], weights[i]);
     }
-    if (sum.there > 0.0 && sum.there < 0.999) {
+    if (there > 0.0 && there < 4.0) {
         for (uint i = 0u; i < 4u; ++i) {
             if (lights[i].there > 0.0) continue;
             ivec2 step = ivec2(i & 1u, i >> 1u);
             ivec2 texel = ivec2(corner) + step;
-            float weight = (step.x == 1 ? f.x : 1.0 - f.x) * (step.y == 1 ? f.y : 1.0 - f.y);
             TexelLight across = lights[i ^ 1u];
             TexelLight down = lights[i ^ 2u];
-            float share = weight / max(across.there + down.there, 1.0);
+            float share = weights[i] / max(across.there + down.there, 1.0);
             add_beyond(sum, across, texel, ivec2(1 - 2 * step.x, 0), share);
             add_beyond(sum, down, texel, ivec2(0, 1 - 2 * step.y), share);
         }
     }
-    if (sum.there < 1e-3) {
+    if (there == 0.0) {
         // All four are buried, as in a gap between objects that is narrower than a texel. The texels around them belong to the same chart, for charts
         // are padded by more (atlas::Settings::padding).
         for (int i = 0; i < 16; ++i) {
             ivec2 step = ivec2(i % 4 - 1, i / 4 - 1);
             if (all(equal(step & ~1, ivec2(0)))) continue;
-            ivec2 texel = ivec2(corner) + step;
-            if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(uvec2(texel), texels))) continue;
             vec2 off = vec2(step) - f;
-            add(sum, texel_light(uvec2(texel)), 0.1 / (1.0 + dot(off, off)));
+            add(sum, lightmap_texel(ivec2(corner) + step), 0.1 / (1.0 + dot(off, off)));
         }
     }
     return mean(sum);
@@ -208,7 +206,7 @@ TexelLight cube_light(vec3 seen, vec3 n) {
     vec2 at = place * float(texels.y) - 0.5;
     ivec2 corner = ivec2(floor(at));
     vec2 f = at - floor(at);
-    TexelLight sum = TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+    TexelLight sum = NO_LIGHT;
     for (int i = 0; i < 4; ++i) {
         ivec2 step = ivec2(i & 1, i >> 1);
         float share = (step.x == 1 ? f.x : 1.0 - f.x) * (step.y == 1 ? f.y : 1.0 - f.y);
@@ -245,7 +243,7 @@ void main() {
     }
     vec3 position = world_from_depth(view, (vec2(pixel) + 0.5) / view.extent, texelFetch(depth, pixel, 0).r);
     vec3 n = decode_normal(texelFetch(normal, pixel, 0));
-    TexelLight light = TexelLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+    TexelLight light = NO_LIGHT;
     if (TEXELS_OF == DAY_VIEW) {
         light = texel_light(uvec2(pixel));
     } else if (TEXELS_OF == DAY_CUBE) {

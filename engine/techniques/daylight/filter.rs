@@ -8,10 +8,9 @@
 
 use std::collections::BTreeMap;
 
-use glam::Vec3;
-
 use super::{
     Kind, Plan,
+    balance::{balance, tangents},
     gathered::{FEATURES, Features, Gathered},
     listed::{Listed, Texel, dot},
 };
@@ -22,8 +21,8 @@ const BY_NOISE: f32 = 2.0;
 const SHARP: f32 = 1.0;
 /// Relative difference of light that is never seen.
 const UNSEEN: f32 = 0.02;
-/// Number of texels in a mean over next neighbours, about: a Gaussian of 1 texel.
-const NEXT: f32 = 6.3;
+/// Number of texels whose plain mean has the noise of the mean over next neighbours: a Gaussian of 1 texel that ends at 2 texels.
+const NEXT: f32 = 9.6;
 /// Change of light from texel to texel that is expected, relative.
 const CHANGE: f32 = 0.02;
 /// Least cosine between the normals of two texels of one surface.
@@ -69,7 +68,7 @@ impl<'a> Filter<'a> {
         let texel = self.listed.texels[of as usize];
         let mut consider = |other: u32, distance: f32| {
             let q = &self.listed.texels[other as usize];
-            let way = [0, 1, 2].map(|i| q.position[i] - texel.position[i]);
+            let way = texel.way_to(q);
             let cosine = dot(q.normal, texel.normal);
             let off = dot(way, texel.normal).abs();
             // On a curved surface the way between two texels leaves the tangent plane by less than half its length.
@@ -106,7 +105,7 @@ impl<'a> Filter<'a> {
                     for y in low[1]..=high[1] {
                         for &other in (low[2]..=high[2]).filter_map(|z| cells.get(&[x, y, z])).flatten() {
                             let q = &self.listed.texels[other as usize];
-                            let way = [0, 1, 2].map(|i| q.position[i] - texel.position[i]);
+                            let way = texel.way_to(q);
                             let distance = dot(way, way).sqrt();
                             if distance <= reach {
                                 consider(other, distance / texel.size.max(f32::MIN_POSITIVE));
@@ -163,63 +162,35 @@ impl<'a> Filter<'a> {
         (SHARP * (found - BY_NOISE)).max(0.0)
     }
 
-    /// The variance of the light of a texel in one half, relative.
-    fn noise(&self, of: u32) -> f32 {
-        let squares = |half: &[f32; FEATURES]| half.iter().map(|value| value * value).sum::<f32>();
-        let light: f32 = self.features[of as usize].iter().map(squares).sum::<f32>() / 2.0;
+    /// The variance of the light of a texel, relative, by one half of the samples.
+    fn noise(&self, half: usize, of: u32) -> f32 {
+        let light: f32 = self.features[of as usize][half].iter().map(|value| value * value).sum();
         let variance: f32 = self.variances[of as usize].iter().sum();
-        // Those of the features are of means over next neighbours.
+        // Variances are those of means over next neighbours.
         if variance > 0.0 { NEXT * variance / light.max(f32::MIN_POSITIVE) } else { 0.0 }
     }
 
     /// The neighbours of a texel, and their weights for the first and for the second half of the samples, each summing to 1.
     pub fn weights(&self, of: u32) -> Vec<(u32, [f32; 2])> {
         let texel = &self.listed.texels[of as usize];
-        let mut out: Vec<(u32, [f32; 2])> = Vec::new();
-        let mut ways = Vec::new();
         let axes = tangents(texel.normal).map(|axis| axis.map(|of| of / texel.size.max(f32::MIN_POSITIVE)));
+        let (mut near, mut ways, mut halves) = (Vec::new(), Vec::new(), [Vec::new(), Vec::new()]);
+        // The second half decides for the first, and the first for the second.
         self.each(of, self.radius, 0.5 * self.radius, |other, weight| {
-            // The second half decides for the first, and the first for the second.
             let weights = [1, 0].map(|half| weight * (-self.difference(half, of, other)).exp());
             if weights.iter().any(|weight| *weight > 1e-4) {
-                let q = &self.listed.texels[other as usize];
-                let way = [0, 1, 2].map(|i| q.position[i] - texel.position[i]);
+                let way = texel.way_to(&self.listed.texels[other as usize]);
+                near.push(other);
                 ways.push(axes.map(|axis| dot(way, axis)));
-                out.push((other, weights));
+                halves.iter_mut().zip(weights).for_each(|(half, weight)| half.push(weight));
             }
         });
-        let noise = self.noise(of);
-        for half in 0..2 {
-            balance(out.iter_mut().map(|(_, weights)| &mut weights[half]), &ways, noise / CHANGE.powi(2));
+        for (weights, half) in halves.iter_mut().zip([1, 0]) {
+            balance(weights, &ways, self.noise(half, of) / CHANGE.powi(2));
         }
-        out
+        let [first, second] = halves;
+        near.into_iter().zip(first.into_iter().zip(second)).map(|(near, (a, b))| (near, [a, b])).collect()
     }
-}
-
-/// Two unit vectors that span the plane of a normal.
-fn tangents(normal: [f32; 3]) -> [[f32; 3]; 2] {
-    let (x, y) = Vec3::from(normal).normalize_or(Vec3::Z).any_orthonormal_pair();
-    [x.into(), y.into()]
-}
-
-/// Makes the sum of some weights 1, and moves their centre towards the texel: light that changes evenly keeps its value where most neighbours lie on
-/// one side. Balanced weights have more noise, so they are balanced as far as a change of the light is likelier than noise. `ways`: to the neighbours,
-/// texels; `noise`: the variance of their light by that of its change from texel to texel.
-fn balance<'a>(weights: impl Iterator<Item = &'a mut f32>, ways: &[[f32; 2]], noise: f32) {
-    let weights: Vec<&mut f32> = weights.collect();
-    let [mut x, mut y, mut xx, mut xy, mut yy] = [0.0f32; 5];
-    for (weight, [dx, dy]) in weights.iter().zip(ways) {
-        (x, y) = (x + **weight * dx, y + **weight * dy);
-        (xx, xy, yy) = (xx + **weight * dx * dx, xy + **weight * dx * dy, yy + **weight * dy * dy);
-    }
-    let (xx, yy) = (xx + noise, yy + noise);
-    let determinant = xx * yy - xy * xy;
-    // Without neighbours there is nothing to balance.
-    let by = if determinant > 0.0 { [yy * x - xy * y, xx * y - xy * x].map(|by| by / determinant) } else { [0.0; 2] };
-    let balanced: Vec<f32> =
-        weights.iter().zip(ways).map(|(weight, [dx, dy])| **weight * (1.0 - by[0] * dx - by[1] * dy)).collect();
-    let sum: f32 = balanced.iter().sum();
-    weights.into_iter().zip(balanced).for_each(|(weight, new)| *weight = new / sum.max(f32::MIN_POSITIVE));
 }
 
 fn cell_of(position: f32, cell: f32) -> i32 {

@@ -38,7 +38,10 @@ pub fn tiles(plan: &Plan, gathered: &[Gathered], mut told: impl FnMut(usize) -> 
     // Both halves of the texels around a tile, and their means: numbers of 32 bits.
     let side = u64::from(plan.side() + 2 * (radius + rim::REACH as u32));
     let dimensions = plan.dimensions().into_iter().max().unwrap_or(1) as u64;
-    let threads = threads.min((MOST_BYTES / (side * side * dimensions * 3 * 4 * 4).max(1)).max(1) as usize);
+    // The neighbours of a texel lie in a disc.
+    let neighbours = u64::from(3 * (radius + 2) * (radius + 2)) * size_of::<Neighbour>() as u64;
+    let threads =
+        threads.min((MOST_BYTES / (side * side * (dimensions * 3 * 4 * 4 + neighbours)).max(1)).max(1) as usize);
     for first in (0..gathered.len()).step_by(threads) {
         let last = (first + threads).min(gathered.len());
         let done: Vec<Result<Tile>> = thread::scope(|scope| {
@@ -97,7 +100,7 @@ fn tile(plan: &Plan, gathered: &[Gathered], mixing: Option<&Mixing<'_>>, index: 
 /// A neighbour of a texel in the whole bake, and its weights in the two halves of the samples.
 type Neighbour = (u32, [f32; 2]);
 
-/// Whose light a texel shows.
+/// Decides which texels' light a texel shows.
 struct Mixing<'a> {
     listed: &'a Listed,
     filter: Option<&'a Filter<'a>>,
@@ -111,19 +114,28 @@ impl Mixing<'_> {
 
     /// The neighbours of all texels of a tile.
     fn of_tile(&self, tile: usize) -> Vec<Vec<Neighbour>> {
-        let mut known: HashMap<u32, Vec<Neighbour>> = HashMap::new();
-        let near = self.listed.of_tile(tile).map(|texel| {
-            let Some(around) = rim::at_centre(self.listed, texel) else { return self.filtered(texel) };
+        let own = self.listed.of_tile(tile);
+        let filtered: Vec<Vec<Neighbour>> = own.clone().map(|texel| self.filtered(texel)).collect();
+        let mut beyond: HashMap<u32, Vec<Neighbour>> = HashMap::new();
+        let mut extrapolated = Vec::new();
+        for texel in own.clone() {
+            let Some(around) = rim::at_centre(self.listed, texel) else { continue };
             let mut sum: BTreeMap<u32, [f32; 2]> = BTreeMap::new();
             for (other, share) in around {
-                for (near, weights) in known.entry(other).or_insert_with(|| self.filtered(other)) {
+                let near = match own.contains(&other) {
+                    true => &filtered[(other - own.start) as usize],
+                    false => &*beyond.entry(other).or_insert_with(|| self.filtered(other)),
+                };
+                for (near, weights) in near {
                     let sum = sum.entry(*near).or_default();
                     sum.iter_mut().zip(weights).for_each(|(sum, weight)| *sum += share * *weight);
                 }
             }
-            sum.into_iter().collect()
-        });
-        near.collect()
+            extrapolated.push((texel, sum.into_iter().collect()));
+        }
+        let mut near = filtered;
+        extrapolated.into_iter().for_each(|(texel, of_texel)| near[(texel - own.start) as usize] = of_texel);
+        near
     }
 }
 

@@ -18,6 +18,18 @@ pub struct Texel {
     pub size: f32,
 }
 
+impl Texel {
+    #[cfg(test)]
+    pub fn at([column, row]: [u32; 2], position: [f32; 3], normal: [f32; 3], offset: [f32; 2]) -> Self {
+        Self { tile: 0, number: 0, column, row, position, normal, offset, size: 1.0 }
+    }
+
+    /// From this texel to another, metres.
+    pub fn way_to(&self, other: &Self) -> [f32; 3] {
+        [0, 1, 2].map(|i| other.position[i] - self.position[i])
+    }
+}
+
 /// All texels of a bake on surfaces, tile after tile.
 #[derive(Debug)]
 pub struct Listed {
@@ -58,12 +70,21 @@ impl Listed {
         listed
     }
 
+    #[cfg(test)]
+    pub fn of(texels: Vec<Texel>, extent: [u32; 2]) -> Self {
+        let mut at = vec![NONE; extent[0] as usize * extent[1] as usize];
+        for (number, texel) in (0..).zip(&texels) {
+            at[(texel.row * extent[0] + texel.column) as usize] = number;
+        }
+        Self { firsts: vec![0, texels.len() as u32], texels, at, extent }
+    }
+
     /// The texels of a tile.
     pub fn of_tile(&self, tile: usize) -> std::ops::Range<u32> {
         self.firsts[tile]..self.firsts[tile + 1]
     }
 
-    /// The texel that many columns and rows beside another in the bake.
+    /// The texel that is so many columns and rows away from another texel in the bake.
     pub fn beside(&self, texel: &Texel, [columns, rows]: [i64; 2]) -> Option<u32> {
         let (x, y) = (i64::from(texel.column) + columns, i64::from(texel.row) + rows);
         let inside = x >= 0 && y >= 0 && x < i64::from(self.extent[0]) && y < i64::from(self.extent[1]);
@@ -77,8 +98,7 @@ impl Listed {
             .iter()
             .map(|texel| {
                 let distance = |way| {
-                    let other = &self.texels[self.beside(texel, way)? as usize];
-                    let way = [0, 1, 2].map(|i| other.position[i] - texel.position[i]);
+                    let way = texel.way_to(&self.texels[self.beside(texel, way)? as usize]);
                     Some(dot(way, way).sqrt()).filter(|distance| *distance > 0.0)
                 };
                 [[1, 0], [-1, 0], [0, 1], [0, -1]].into_iter().filter_map(distance).fold(f32::INFINITY, f32::min)

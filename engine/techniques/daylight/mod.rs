@@ -9,6 +9,7 @@ pub mod adaptive;
 mod added;
 pub mod atlas;
 mod baked;
+mod balance;
 pub mod beam;
 pub mod blocks;
 mod buried;

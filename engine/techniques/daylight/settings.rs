@@ -201,6 +201,8 @@ pub enum SkyLight {
     /// The light of the sky under the day's highest sun, scaled by the height of the sun, as the paper scales one image. The paper names no
     /// function of the height; this one is the sine of the elevation.
     Scaled,
+    /// Surfaces have no light of the sky. It is shown behind the scene all the same.
+    None,
 }
 
 /// Settings of pictures.

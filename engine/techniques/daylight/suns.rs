@@ -66,7 +66,7 @@ impl Share {
 /// The items of the passes that trace rays to the sun from `places`: the times. `bounces`: vertices that a path, or 1 that a point of a mask, has at most.
 pub(super) fn times_of(times: u32, places: u64, bounces: u64, most_turns: u64) -> Items {
     // About half of the vertices are there, a third of these want a ray at a time, and the triangle that hid the sun before saves two thirds of the rays. To
-    // find out whether a ray is wanted takes a fraction of its time. Points of masks are all there, and the sun is before half of them.
+    // find out whether a ray is wanted takes a fraction of its time. Points of masks are all there, and half of them face the sun.
     let rays = (places * bounces).div_ceil(8);
     // The loop around the rays begins every few turns, and a ray may wait for others until then.
     Items::new(times).rays(rays).turns(bounces * (most_turns + most_turns / u64::from(consts::VISIBILITY_TURNS) + 16))

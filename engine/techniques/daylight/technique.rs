@@ -138,6 +138,7 @@ impl Daylight {
         let scaled = |sky: &Sky, factor: f32| sky.patches().iter().map(|patch| patch.map(|c| c * factor)).collect();
         match settings.sky {
             SkyLight::Patches => Ok(scaled(sky, settings.strength)),
+            SkyLight::None => Ok(scaled(sky, 0.0)),
             SkyLight::Scaled => {
                 let plan = &self.baked.stored.plan;
                 let suns = plan.times[plan.of_day(day)].iter().map(|time| time.sun);

@@ -32,6 +32,8 @@ struct Rank {
     triangle: u32,
 }
 
+/// Weights are rounded to 32 bits: by less than so many texels at the far end of a triangle as wide as a lightmap.
+const ROUNDED: f64 = 1e-3;
 /// Points of [`spread`] along a side of a texel.
 const GRID: u32 = 4;
 
@@ -68,17 +70,20 @@ pub fn texels(atlas: &Atlas) -> Vec<Texel> {
         if first <= last {
             for x in first..=last {
                 if let Some((rank, barycentric)) = best[x as usize].take() {
-                    let centre = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
-                    let corners = atlas.corners[rank.triangle as usize].map(|corner| corner.as_dvec2());
-                    let inside = rank.distance == 0.0;
-                    let offset = if inside { DVec2::ZERO } else { point(&corners, barycentric) - centre };
-                    let offset = offset.as_vec2().to_array();
-                    result.push(Texel { x, y, triangle: rank.triangle, barycentric, offset });
+                    result.push(texel([x, y], rank, barycentric, atlas));
                 }
             }
         }
     }
     result
+}
+
+/// The texel with its place in the triangle of its rank.
+fn texel([x, y]: [u32; 2], rank: Rank, barycentric: [f32; 2], atlas: &Atlas) -> Texel {
+    let centre = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
+    let corners = atlas.corners[rank.triangle as usize].map(|corner| corner.as_dvec2());
+    let offset = if rank.distance == 0.0 { DVec2::ZERO } else { point(&corners, barycentric) - centre };
+    Texel { x, y, triangle: rank.triangle, barycentric, offset: offset.as_vec2().to_array() }
 }
 
 /// Lists places of a covered texel where its light can be gathered, the nearest to its centre first: the points of its charts that are the
@@ -101,19 +106,18 @@ pub(in super::super) fn spread(corners: &[[Vec2; 3]], triangles: &[u32], [x, y]:
     let corner = DVec2::new(f64::from(x), f64::from(y));
     let step = |number: u32| (f64::from(number) + 0.5) / f64::from(GRID);
     let mut found: Vec<(f64, u32, [f32; 2])> = Vec::new();
-    for point in (0..GRID * GRID).map(|i| corner + DVec2::new(step(i % GRID), step(i / GRID))) {
+    for wanted in (0..GRID * GRID).map(|i| corner + DVec2::new(step(i % GRID), step(i / GRID))) {
         let best = near
             .iter()
             .map(|(triangle, flat)| {
-                let (barycentric, distance) = nearest(flat, point);
+                let (barycentric, distance) = nearest(flat, wanted);
                 (Rank { is_flat: is_flat(flat), distance, triangle: *triangle }, barycentric, flat)
             })
             .reduce(|best, next| if next.0 < best.0 { next } else { best });
         let Some((rank, weights, flat)) = best else { continue };
-        let inside = self::point(flat, weights) - corner;
+        let inside = point(flat, weights) - corner;
         let is_new = !found.iter().any(|(_, triangle, known)| (*triangle, *known) == (rank.triangle, weights));
-        // Weights are rounded to 32 bits.
-        if is_new && inside.cmpge(DVec2::splat(-1e-5)).all() && inside.cmple(DVec2::splat(1.0 + 1e-5)).all() {
+        if is_new && inside.cmpge(DVec2::splat(-ROUNDED)).all() && inside.cmple(DVec2::splat(1.0 + ROUNDED)).all() {
             found.push((inside.distance_squared(DVec2::splat(0.5)), rank.triangle, weights));
         }
     }

@@ -111,21 +111,21 @@ pub fn faces(light: &[[f32; 3]], sources: &[u32], side: u32) -> Vec<(Vec<[f32; 3
 }
 
 /// The light with its padding filled. `width`: of a lightmap. The padding beside the texels of its charts continues the light of the last two of a row or
-/// column, as pictures do; everything else shows the light of its source.
+/// column, nearly as pictures do; all other padding shows the light of its source.
 pub fn filled(light: &[[f32; 3]], sources: &[u32], width: Option<u32>) -> Vec<[f32; 3]> {
     let there = |source: u32| light.get(source as usize).copied();
-    let shown = |(texel, source): (usize, &u32)| {
+    let shown = |texel: usize, source: &u32| {
         let near = there(*source)?;
         let by = i64::from(*source) - texel as i64;
+        // Charts do not reach the borders of a lightmap, so three texels beside each other are in one row.
         let beside = width.is_some_and(|width| {
-            let is_next = by.abs() == 1 && source / width == texel as u32 / width;
-            is_next || by.abs() == i64::from(width) && width > 1
+            by.abs() == i64::from(width) || by.abs() == 1 && source / width == texel as u32 / width
         });
         let far = u32::try_from(i64::from(*source) + by).ok().filter(|far| sources.get(*far as usize) == Some(far));
         let Some(far) = far.filter(|_| beside).and_then(there) else { return Some(near) };
         Some(std::array::from_fn(|i| (2.0 * near[i] - far[i]).clamp(0.5 * near[i], 2.0 * near[i])))
     };
-    sources.iter().enumerate().map(|of| shown(of).unwrap_or_default()).collect()
+    sources.iter().enumerate().map(|(texel, source)| shown(texel, source).unwrap_or_default()).collect()
 }
 
 /// The levels of an image, the largest first.

@@ -46,7 +46,7 @@ impl Experiment {
     /// The part of a whole experiment.
     ///
     /// # Errors
-    /// `Usage` if a scene is unknown; `Input` if the size is none.
+    /// `Usage` if a scene is unknown; `Input` if the size cannot be read.
     pub fn narrow(mut self, narrowed: &Narrowed) -> Result<Self> {
         if let Some(size) = &narrowed.size {
             self.size = size.parse().map_err(|what| Error::input(format!("size: {what}")))?;

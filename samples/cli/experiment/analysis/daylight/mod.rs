@@ -7,6 +7,7 @@ mod added;
 mod beside;
 mod between;
 mod day;
+mod elements;
 mod sizes;
 mod variance;
 
@@ -34,6 +35,9 @@ pub(super) fn analyse(results: &Results, page: &mut Page) -> Result<()> {
         page.add(restored);
         page.add(between::adaptive(&days)?);
         page.add(between::interpolation(&days)?);
+    }
+    if let Some(section) = elements::section(results)? {
+        page.add(section);
     }
     page.add(beside::section(results)?);
     if let Some(section) = added::section(results)? {

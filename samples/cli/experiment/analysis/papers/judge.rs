@@ -71,7 +71,7 @@ pub enum Verdict {
     FullModeOnly,
     /// A property of the paper's machine.
     Hardware,
-    /// There is no report of the experiment.
+    /// There is no report of the experiment, or of its part with the number.
     NoReport,
 }
 

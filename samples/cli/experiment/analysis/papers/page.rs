@@ -19,14 +19,14 @@ pub struct Judged {
 /// Judges a number by the reports.
 pub fn judge(number: &Number, experiment: &str, reports: &Reports) -> Judged {
     let report = |reference: &Reference| reports.get(reference.experiment.as_deref().unwrap_or(experiment));
-    let quick = |reference: &Reference| report(reference).is_some_and(|report| report.quick);
+    let may_lack = |reference: &Reference| report(reference).is_some_and(|report| report.may_lack(reference.full));
     let mut broken = Vec::new();
     // A reason counts only if everything that shows it exists.
     let mut shown = !number.shown.is_empty() && number.reason.is_some();
     for reference in &number.shown {
         if let Err(what) = reports.has(reference, experiment) {
             shown = false;
-            if report(reference).is_some() && !(reference.full && quick(reference)) {
+            if report(reference).is_some() && !may_lack(reference) {
                 broken.push(what);
             }
         }
@@ -39,11 +39,12 @@ pub fn judge(number: &Number, experiment: &str, reports: &Reports) -> Judged {
     if report(reference).is_none() {
         return verdict(Verdict::NoReport);
     }
-    if reference.full && quick(reference) {
+    if reference.full && report(reference).is_some_and(|report| report.quick) {
         return verdict(Verdict::FullModeOnly);
     }
     let found = match reports.cell(reference, experiment) {
         Ok(found) => found,
+        Err(_) if may_lack(reference) => return verdict(Verdict::NoReport),
         Err(what) => {
             broken.push(what);
             return Judged { verdict: Verdict::Open, ours: None, broken };
@@ -246,7 +247,7 @@ fn figures(ledger: &Ledger, reports: &Reports, broken: &mut Vec<String>) -> Tabl
     for figure in &ledger.figure {
         for reference in figure.references() {
             let report = reports.get(reference.experiment.as_deref().unwrap_or(&ledger.experiment));
-            let expected = report.is_some_and(|report| !(reference.full && report.quick));
+            let expected = report.is_some_and(|report| !report.may_lack(reference.full));
             if let Err(what) = reports.has(reference, &ledger.experiment)
                 && expected
             {

@@ -19,6 +19,8 @@ pub struct Reports(BTreeMap<&'static str, Report>);
 pub struct Report {
     data: Vec<Value>,
     pub quick: bool,
+    /// A part of the experiment alone, which may lack any cell.
+    pub part: bool,
     /// Reasons why the report is not complete.
     pub warnings: Vec<String>,
     /// Name and value: device, driver, revision, command line.
@@ -143,8 +145,13 @@ impl Report {
         let Some(facts) = self.data.first().and_then(|data| data["facts"].as_object()) else { return };
         self.facts =
             facts.iter().filter_map(|(name, value)| Some((name.clone(), value.as_str()?.to_owned()))).collect();
-        // A part is judged as the quick mode is: it may lack cells of the whole experiment.
-        self.quick = self.fact("Mode") == "quick" || !self.fact("Part").is_empty();
+        self.quick = self.fact("Mode") == "quick";
+        self.part = !self.fact("Part").is_empty();
+    }
+
+    /// Whether the report may lack what a reference names. `full`: only the full mode has it.
+    pub fn may_lack(&self, full: bool) -> bool {
+        self.part || full && self.quick
     }
 
     /// A fact by its name.

@@ -205,6 +205,16 @@ fn a_reason_counts_only_if_its_proof_exists() {
 }
 
 #[test]
+fn a_part_of_an_experiment_may_lack_any_cell() {
+    let whole = json!({ "facts": { "Mode": "full" }, "tables": {} });
+    let part = json!({ "facts": { "Mode": "full", "Part": "--scene hall" }, "tables": {} });
+    let lost = "paper = 4.0\nreason = 'noise'\nshown = [{ plot = 'p' }]\nours = { table = 'none', column = 'x' }";
+    let [of_whole, of_part] = [whole, part].map(|data| judge(&number(lost), "isr", &Reports::of("isr", data)));
+    assert_eq!((of_whole.verdict, of_whole.broken.len()), (Verdict::Open, 2));
+    assert_eq!((of_part.verdict, of_part.broken.len()), (Verdict::NoReport, 0));
+}
+
+#[test]
 fn mistakes_in_a_ledger_name_the_entry() {
     let head = "document = 'd'\nshort = 'D'\nexperiment = 'isr'\n[[number]]\npaper = 1.0\n";
     for (entry, says) in [
