@@ -93,10 +93,15 @@ fn rebuilt(folder: &Path, day: &Value, seconds: f64) -> Vec<f32> {
             }
         }
     }
+    padded(folder, &table, &light)
+}
+
+/// The light with the padding of step 5 of the page of the format.
+pub fn padded(folder: &Path, table: &Value, light: &[f32]) -> Vec<f32> {
     let (_, _, _, raw) = ktx2(folder.join(table["sources"].as_str().unwrap()));
     let sources: Vec<i64> = raw.as_chunks::<4>().0.iter().map(|b| i64::from(u32::from_le_bytes(*b))).collect();
     let value = |texel: i64, channel: usize| light[3 * texel as usize + channel].max(0.0);
-    let across = width as i64;
+    let across = table["width"].as_i64().unwrap();
     sources
         .iter()
         .zip(0..)
@@ -117,7 +122,7 @@ fn rebuilt(folder: &Path, day: &Value, seconds: f64) -> Vec<f32> {
 }
 
 /// Root mean square of the difference from a picture of the export, relative to its mean.
-fn apart(folder: &Path, exr: &Value, light: &[f32]) -> f64 {
+pub fn apart(folder: &Path, exr: &Value, light: &[f32]) -> f64 {
     let written = pixels(folder.join(exr.as_str().unwrap())).main().unwrap().rgb_pixels().unwrap();
     let written = written.as_flattened();
     assert_eq!(written.len(), light.len());

@@ -31,6 +31,10 @@ mod door;
 mod effects;
 #[path = "../cli/experiment.rs"]
 mod experiment;
+#[path = "../cli/experiment_files.rs"]
+mod experiment_files;
+#[path = "../cli/experiment_place.rs"]
+mod experiment_place;
 #[path = "../cli/export_gltf.rs"]
 mod export_gltf;
 #[path = "../cli/export_pov.rs"]
