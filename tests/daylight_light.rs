@@ -8,7 +8,7 @@ use glam::{Mat4, Vec3, vec3};
 use lucerna::{
     gpu::{Gpu, testing::with_gpu},
     scene::{Environment, LightKind, Material, Scene, View},
-    techniques::daylight::{Baking, Calendar, Kind, Lit, Plan, Sources, Transport, Weather, parts, units},
+    techniques::daylight::{Baking, Calendar, Kind, Lit, Plan, Sky, Sources, Transport, Weather, parts, units},
     tracer::{Filter, Settings},
 };
 
@@ -120,6 +120,49 @@ fn shared_paths_have_the_light_of_the_path_tracer_at_each_time_and_of_the_sky() 
                 let ratio = found[channel] / wanted[channel];
                 assert!((ratio - 1.0).abs() < 0.015, "time {time}, channel {channel}: {ratio}");
             }
+        }
+    });
+}
+
+#[test]
+fn skies_of_any_haze_are_within_the_tolerance() {
+    with_gpu(|gpu| {
+        let (scene, view) = (stage(), eye());
+        let settings = Baking { samples: 64, filter: 0, noise_floor: false, ..baking() };
+        // Half of the suns of the day are those of the guarantee.
+        let suns: Vec<[f32; 3]> = (0..48)
+            .map(|step| (3.0 + 174.0 * step as f32 / 47.0).to_radians())
+            .map(|angle| vec3(-angle.cos(), 0.8 * angle.sin(), 0.6 * angle.sin()).to_array())
+            .collect();
+        let times = suns.iter().enumerate().map(|(i, sun)| Lit { seconds: 900.0 * i as f64, sun: *sun }).collect();
+        let plan = Plan { times, steps: 48, ..plan(&scene, &view, settings) };
+        let skies = units::skies(&plan).unwrap();
+        let tiles = lights(gpu, &scene, &plan, Sources::View(Box::new(view)));
+        let tiles: Vec<_> = tiles.iter().map(|light| (light, units::compress(&plan, light, &skies).unwrap())).collect();
+        for turbidity in [1.0, 1.5, 2.0, 3.0, 4.0, 6.0, 8.0, 10.0] {
+            let mut worst = 0.0f64;
+            for sun in &suns {
+                let weather = Weather::new(turbidity, 0.3, 0.0).unwrap();
+                let patches = Sky::new(weather, sun.map(f64::from)).unwrap().patches();
+                for (light, tile) in &tiles {
+                    let coefficients = tile.sky.mix(patches.iter().copied().enumerate());
+                    let texels = light.spots.len();
+                    let (mut square, mut sum) = (0.0, 0.0);
+                    for texel in 0..texels {
+                        let found = tile.sky.decode(texel, &coefficients);
+                        for (channel, found) in found.into_iter().enumerate() {
+                            let row = &light.sky[146 * (3 * texel + channel)..][..146];
+                            let wanted: f32 =
+                                row.iter().zip(&patches).map(|(along, patch)| along * patch[channel]).sum();
+                            (square, sum) = (square + f64::from(found - wanted).powi(2), sum + f64::from(wanted));
+                        }
+                    }
+                    let count = 3.0 * texels as f64;
+                    worst = worst.max((square / count).sqrt() / (sum / count));
+                }
+            }
+            println!("turbidity {turbidity}: worst tile {:.2} %", 100.0 * worst);
+            assert!(worst < 1.05 * plan.settings.tolerance, "turbidity {turbidity}: {worst}");
         }
     });
 }

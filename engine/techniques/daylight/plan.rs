@@ -208,7 +208,7 @@ pub struct Plan {
     pub steps: u32,
     /// The lit steps, in order.
     pub times: Vec<Lit>,
-    /// The weather whose skies are within the tolerance.
+    /// The weather whose skies are within the tolerance, beside those of the clearest and the haziest air and overcast ones.
     pub weather: Weather,
     /// Groups of lamps, which can be switched.
     pub lamps: Vec<Group>,

@@ -2,7 +2,7 @@
 //! are there, they become the compressed [`Tile`]s of a file ([`super::finish`]).
 
 use super::{
-    Plan, Sky, Texels, Transport,
+    Plan, Sky, Texels, Transport, Weather,
     blocks::{Blocks, Coding, Layout},
     columns::{Columns, Measured},
     gathered::Gathered,
@@ -19,7 +19,7 @@ use crate::{
 /// The name of such jobs.
 pub const KIND: &str = "daylight";
 /// Increased whenever the computation changes.
-const VERSION: u32 = 9;
+const VERSION: u32 = 10;
 /// Largest number that a list in a unit may have.
 const MOST_WORDS: u64 = 1 << 32;
 
@@ -59,7 +59,11 @@ pub fn job(plan: &Plan, device: &str, texels: Option<&[u64]>) -> Result<Job> {
     Ok(Job::new(key, vec![Stage::new("tiles", costs)])?.about(about))
 }
 
-/// The skies that a bake guarantees: clear and overcast, at up to 24 of its times, and an even sky. One row of all patches for each.
+/// Turbidities of the clearest and of the haziest air, whose skies a bake guarantees beside those of its own weather.
+const HAZES: [f64; 2] = [1.0, 10.0];
+
+/// The skies that a bake guarantees: clear, overcast, and of the clearest and the haziest air, at up to 24 of its times, and an even sky. One row of all
+/// patches for each.
 ///
 /// # Errors
 /// `Input` if the plan has impossible weather.
@@ -67,13 +71,18 @@ pub fn skies(plan: &Plan) -> Result<Vec<f32>> {
     let patches = SKY_PATCHES as usize;
     let mut rows = vec![1.0; patches];
     let step = plan.times.len().div_ceil(24).max(1);
-    let times = plan.times.iter().step_by(step);
-    let skies = times.map(|time| Sky::new(plan.weather, time.sun.map(f64::from))).collect::<Result<Vec<_>, _>>();
-    let skies = skies.map_err(Error::input)?;
-    for overcast in [0.0, 1.0] {
-        for sky in &skies {
-            let radiances = sky.with_overcast(overcast).map_err(Error::input)?.patches();
-            rows.extend(radiances.iter().map(|[r, g, b]| 0.2126 * r + 0.7152 * g + 0.0722 * b));
+    let suns: Vec<[f64; 3]> = plan.times.iter().step_by(step).map(|time| time.sun.map(f64::from)).collect();
+    let mut add = |sky: Sky| {
+        rows.extend(sky.patches().iter().map(|[r, g, b]| 0.2126 * r + 0.7152 * g + 0.0722 * b));
+    };
+    for sun in &suns {
+        let sky = Sky::new(plan.weather, *sun).map_err(Error::input)?;
+        for overcast in [0.0, 1.0] {
+            add(sky.with_overcast(overcast).map_err(Error::input)?);
+        }
+        for turbidity in HAZES {
+            let weather = Weather::new(turbidity, plan.weather.ground_albedo(), 0.0).map_err(Error::input)?;
+            add(Sky::new(weather, *sun).map_err(Error::input)?);
         }
     }
     Ok(rows)
