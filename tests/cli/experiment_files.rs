@@ -233,3 +233,19 @@ layers = ["irradiance", "covered"]
     assert_eq!(kept.iter().map(written).collect::<Vec<_>>(), before);
     assert!(contents(&place.path("out")) == first);
 }
+
+#[test]
+fn every_shipped_experiment_finds_its_scenes_and_views() {
+    let Some(assets) = support::asset("").filter(|_| support::device()) else { return };
+    let (assets, place) = (assets.to_str().unwrap(), Place::new());
+    let output = place.path("out");
+    let list = lucerna(["reproduce", "--list", "--json"]).expect(0, &[]).json();
+    for name in list.as_array().unwrap().iter().map(|entry| entry["name"].as_str().unwrap()) {
+        // `isr-pair` has the scenes and views of `isr`.
+        if name != "isr-pair" {
+            let options = ["--dry-run", "--assets", assets, "-o", output.to_str().unwrap()];
+            let listed = lucerna([&["reproduce", name], &options[..]].concat()).expect(0, &[]).stdout;
+            assert!(listed.ends_with(" runs, 0 of them exist\n"), "{name}: {listed}");
+        }
+    }
+}
