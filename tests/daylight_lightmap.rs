@@ -271,11 +271,11 @@ fn gloss_reflects_as_much_of_even_light_as_the_path_tracer_says() {
 }
 
 /// Least and mean irradiance of a floor beside a black block that stands in it, or on it, seen from above; by that of an open floor. `gap`: metres
-/// between two such blocks that are narrow, around `middle`; `side`: of the part of the floor that is seen, metres; `two_sided`: surfaces of the blocks;
+/// between two such blocks that are narrow, around `middle`, and that reach so far to both sides; `side`: of the part of the floor that is seen, metres; `two_sided`: surfaces of the blocks;
 /// `turned`: the walls of the room have two sides, and their fronts face outwards.
 fn beside_a_block(
     gpu: &Gpu,
-    [foot, head, gap, middle]: [f32; 4],
+    [foot, head, gap, middle, reach]: [f32; 5],
     side: f32,
     [two_sided, turned]: [bool; 2],
 ) -> [f32; 2] {
@@ -284,8 +284,8 @@ fn beside_a_block(
         let black = stage.material(black);
         stage.quad(grey, vec3(-1.2, 0.0, -1.2), Vec3::Z * 2.4, Vec3::X * 2.4);
         if gap > 0.0 {
-            stage.cuboid(black, vec3(-0.17, foot, -0.53), vec3(middle - 0.5 * gap, head, 0.53), false);
-            stage.cuboid(black, vec3(middle + 0.5 * gap, foot, -0.53), vec3(0.17, head, 0.53), false);
+            stage.cuboid(black, vec3(-reach, foot, -0.53), vec3(middle - 0.5 * gap, head, 0.53), false);
+            stage.cuboid(black, vec3(middle + 0.5 * gap, foot, -0.53), vec3(reach, head, 0.53), false);
         } else {
             stage.cuboid(black, vec3(-0.53, foot, -0.53), vec3(0.53, head, 0.53), false);
         }
@@ -309,7 +309,7 @@ fn beside_a_block(
 fn a_thing_that_stands_in_a_floor_has_no_black_seam() {
     with_gpu(|gpu| {
         for (foot, two_sided) in [(-0.5, false), (1e-4, false), (-0.5, true)] {
-            let [least, _] = beside_a_block(gpu, [foot, 0.6, 0.0, 0.0], 2.0, [two_sided, false]);
+            let [least, _] = beside_a_block(gpu, [foot, 0.6, 0.0, 0.0, 0.0], 2.0, [two_sided, false]);
             println!("foot at {foot} m, surfaces with two sides: {two_sided}: {least:.3} of the open floor's light");
             // A floor beside a wall without an end would have half of the light, with the noise of its paths.
             assert!(least > 0.45, "foot at {foot} m, surfaces with two sides: {two_sided}: {least}");
@@ -325,7 +325,7 @@ fn the_floor_of_a_gap_that_is_narrower_than_a_texel_has_the_light_of_the_gap() {
         for (gap, head, turned) in [(0.1f32, 0.02f32, false), (0.1, 0.3, false), (0.1, 0.3, true), (0.04, 0.12, false)]
         {
             let wanted = gap / gap.hypot(2.0 * head);
-            let [least, mean] = beside_a_block(gpu, [-0.5, head, gap, 0.0], 0.8 * gap, [false, turned]);
+            let [least, mean] = beside_a_block(gpu, [-0.5, head, gap, 0.0, 0.17], 0.8 * gap, [false, turned]);
             let name = format!("blocks of {head} m, {gap} m apart, walls turned: {turned}");
             println!("{name}: {mean:.3} of the open floor's light, at least {least:.3}; {wanted:.3} in the middle");
             assert!((mean / wanted - 1.0).abs() < 0.25 && least > 0.6 * wanted, "{name}: {mean}, {least}");
@@ -336,11 +336,11 @@ fn the_floor_of_a_gap_that_is_narrower_than_a_texel_has_the_light_of_the_gap() {
 #[test]
 fn the_floor_of_a_gap_between_the_places_of_a_texel_is_not_black() {
     with_gpu(|gpu| {
-        // Places at odd eighths of a texel of 0.125 m are tried, and none is in the gap. The light continues that of the floor beside the blocks; that of the
-        // gap is 0.29 in the middle.
-        let [least, mean] = beside_a_block(gpu, [-0.5, 0.02, 0.012, 0.015], 0.01, [false; 2]);
+        // Places are an eighth of a texel of 0.125 m away from one another and more, and none is in the gap. The blocks cover all texels around a pixel, so
+        // its light is that of the floor beside the blocks; that of the gap is 0.29 in the middle.
+        let [least, mean] = beside_a_block(gpu, [-0.5, 0.02, 0.012, 0.0306, 0.21], 0.01, [false; 2]);
         println!("{mean:.3} of the open floor's light, at least {least:.3}");
-        assert!(least > 0.4 && mean < 0.7, "{least} {mean}");
+        assert!(least > 0.4, "{least} {mean}");
     });
 }
 
