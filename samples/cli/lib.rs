@@ -51,6 +51,7 @@ pub mod scene_bounds;
 pub mod screen;
 pub mod setting_options;
 pub mod settings_list;
+mod shell;
 pub mod sight;
 pub mod signals;
 pub mod smooth;

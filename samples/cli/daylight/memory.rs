@@ -21,7 +21,7 @@ pub(super) struct Memory {
 /// Vectors of a kind of light: few, and many. Their number follows from the light, so both figures are estimates.
 const VECTORS: [u64; 2] = [4, 128];
 /// Bytes of a texel besides its coefficients: its surface, and what the filter compares, with copies that the filter makes.
-const BYTES_PER_TEXEL: u64 = 24 + 2 * 64 + 32 + 44;
+const BYTES_PER_TEXEL: u64 = 32 + 2 * 64 + 32 + 52;
 /// Bytes of a vector's coefficients at a texel: three colours, mean and noise, 16 bits.
 const BYTES_PER_VECTOR: u64 = 12;
 

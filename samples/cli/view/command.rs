@@ -218,14 +218,6 @@ pub fn on_path(words: Vec<String>, path: &str, frames: u32) -> Vec<String> {
     out
 }
 
-/// Words as a shell reads them.
-pub fn quoted(words: &[String]) -> String {
-    let plain =
-        |word: &str| !word.is_empty() && word.chars().all(|c| c.is_ascii_alphanumeric() || "-_./=,:+@%".contains(c));
-    let quote = |word: &String| if plain(word) { word.clone() } else { format!("'{}'", word.replace('\'', r"'\''")) };
-    words.iter().map(quote).collect::<Vec<_>>().join(" ")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -320,11 +312,5 @@ mod tests {
             }
         }
         assert!(count > 20, "{count}");
-    }
-
-    #[test]
-    fn words_are_quoted_where_a_shell_would_break_them() {
-        let words = ["a.glb", "my scene.glb", "it's", "-D", "isr.samples=80", ""].map(str::to_owned);
-        assert_eq!(quoted(&words), r"a.glb 'my scene.glb' 'it'\''s' -D isr.samples=80 ''");
     }
 }

@@ -16,6 +16,7 @@ use super::{
     command::{self, Common},
     text,
 };
+use crate::shell;
 
 /// What keys and the mouse do.
 pub const HELP: [(&str, &str); 27] = [
@@ -225,7 +226,7 @@ fn words(viewer: &Viewer) -> Result<Vec<String>, String> {
 pub fn copy(viewer: &mut Viewer, context: &Context) {
     match words(viewer) {
         Ok(words) => {
-            let text = format!("lucerna {}", command::quoted(&words));
+            let text = format!("lucerna {}", shell::line(&words));
             context.copy_text(text.clone());
             viewer.say(format!("copied: {text}"));
         }
@@ -271,7 +272,7 @@ pub fn sequence(viewer: &mut Viewer, words: Vec<String>, path: &str, frames: u32
     let free = (1..10_000).find(|&number| !name(number, "0000").exists()).unwrap_or(10_000);
     let file = name(free, "{frame:04}");
     let output = ["-o".to_owned(), file.display().to_string()];
-    let text = format!("lucerna {}", command::quoted(&[&words[..], &output].concat()));
+    let text = format!("lucerna {}", shell::line([&words[..], &output].concat()));
     write(viewer, words, file, true);
     text
 }

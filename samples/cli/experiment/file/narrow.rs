@@ -6,7 +6,7 @@ use lucerna::{Error, Result};
 use serde::{Deserialize, Serialize};
 
 use super::Experiment;
-use crate::{args::Size, config};
+use crate::{args::Size, config, shell};
 
 /// What is left of an experiment, and what is changed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -33,12 +33,9 @@ impl Narrowed {
 /// The options of the command line that narrow an experiment so.
 impl fmt::Display for Narrowed {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let size = self.size.iter().map(|size| format!("--size {size}"));
-        let scenes = self.scenes.iter().map(|scene| match scene.contains(char::is_whitespace) {
-            true => format!("--scene '{scene}'"),
-            false => format!("--scene {scene}"),
-        });
-        f.write_str(&size.chain(scenes).collect::<Vec<_>>().join(" "))
+        let size = self.size.iter().flat_map(|size| ["--size", size]);
+        let scenes = self.scenes.iter().flat_map(|scene| ["--scene", scene]);
+        f.write_str(&shell::line(size.chain(scenes)))
     }
 }
 
