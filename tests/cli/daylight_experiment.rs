@@ -101,6 +101,14 @@ fn the_shipped_experiment_gives_all_its_tables() {
     assert!(linear.len() >= 3 && linear[0] < linear[2], "{linear:?}");
 
     // The technique beside the path tracer: sixteen paths a texel have the energy within some per cent.
+    let elements = rows(&report, "elements");
+    let [row] = &elements[..] else { panic!("{elements:?}") };
+    let shares = ["direct (%)", "indirect (%)", "sky, scaled (%)"].map(|column| number(row, column));
+    assert!(shares.iter().all(|share| (0.1..90.0).contains(share)), "{row:?}");
+    // The picture is the sum of its elements, rounded to 16 bits.
+    assert!((number(row, "sum (%)") - 100.0).abs() < 0.2, "{row:?}");
+    assert!((number(row, "sky by patches / scaled") - 1.0).abs() < 0.1, "{row:?}");
+
     let beside = rows(&report, "beside");
     assert_eq!(beside.len(), 4 * TIMES.len());
     for row in &beside {

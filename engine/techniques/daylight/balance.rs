@@ -66,7 +66,7 @@ mod tests {
                 assert!((weights.iter().sum::<f32>() - 1.0).abs() < 1e-4);
                 mean(&weights, &ways, light)
             };
-            // Without noise it is exact; with much noise it is the plain mean; between, between.
+            // Without noise the value is exact, with much noise it is the plain mean, and with some noise it lies between both.
             assert!((at(0.0) - 1.0).abs() < 1e-4 && (biased - 1.0).abs() > 0.05, "{} {biased}", at(0.0));
             assert!((at(f32::INFINITY) - biased).abs() < 1e-4 && (at(1e12) - biased).abs() < 1e-4);
             let half = at(30.0);

@@ -16,7 +16,7 @@ const ELEMENTS: &str = "elements";
 /// The key of its matrix.
 const SKY: &str = "picture.daylight.sky";
 
-/// What one picture has more than another.
+/// One picture less another, pixel by pixel.
 fn difference(more: &Picture, less: &Picture) -> Vec<[f32; 3]> {
     let pixel = |(a, b): (&[f32; 3], &[f32; 3])| std::array::from_fn(|channel| a[channel] - b[channel]);
     more.pixels.iter().zip(&less.pixels).map(pixel).collect()
@@ -27,11 +27,18 @@ pub(super) fn section(results: &Results) -> Result<Option<Section>> {
     let mut section = Section::new("Figure 3: the elements of a picture");
     section.text(
         "A picture is the sum of the sun's direct light, drawn with a shadow map; the indirect light of the sun, from the bake; and the light of the sky, direct and indirect, from \
-         the bake too. As in the paper, the light of the sky is that of the day's highest sun, scaled; the last column has it by the radiance of each patch of the sky at the \
-         time. Shares are of the mean of all pixels, without the sky behind the scene. The paper shows three pictures and gives no numbers.",
+         the bake too. As in the paper, the light of the sky is that of the day's highest sun, scaled; the last column compares it with the light by the radiance of each patch of the sky at the \
+         time. Shares are of the mean of the picture's pixels, without the sky behind the scene. The paper shows three pictures and gives no numbers.",
     );
-    let columns =
-        ["scene", "direct (%)", "indirect (%)", "sky, scaled (%)", "mean (W/(sr m²))", "sky by patches / scaled"];
+    let columns = [
+        "scene",
+        "direct (%)",
+        "indirect (%)",
+        "sky, scaled (%)",
+        "sum (%)",
+        "picture, mean (W/(sr m²))",
+        "sky by patches / scaled",
+    ];
     let mut table = Table::new("elements", "Shares of the elements", columns);
     let mut sets = Vec::new();
     for view in results.views() {
@@ -40,11 +47,12 @@ pub(super) fn section(results: &Results) -> Result<Option<Section>> {
         };
         let (Some(dark), Some(scaled), Some(patches)) = (of("none"), of("scaled"), of("patches")) else { continue };
         let layer = |run, name| results.picture(Layer(run, name));
-        let (mut direct, indirect) = (layer(dark, "direct")?, layer(dark, "indirect")?);
+        let (mut direct, indirect, mut whole) = (layer(dark, "direct")?, layer(dark, "indirect")?, layer(scaled, "")?);
         // Where no surface is, the direct light is the sky behind the scene.
-        let nowhere = |normal: &[f32; 3]| *normal == [0.0; 3];
-        for (pixel, normal) in direct.pixels.iter_mut().zip(layer(dark, "normal")?.pixels) {
-            *pixel = if nowhere(&normal) { [0.0; 3] } else { *pixel };
+        for (pixel, normal) in layer(dark, "normal")?.pixels.iter().enumerate() {
+            if *normal == [0.0; 3] {
+                (direct.pixels[pixel], whole.pixels[pixel]) = ([0.0; 3], [0.0; 3]);
+            }
         }
         let sky = difference(&layer(scaled, "indirect")?, &indirect);
         let exact = difference(&layer(patches, "indirect")?, &indirect);
@@ -52,7 +60,7 @@ pub(super) fn section(results: &Results) -> Result<Option<Section>> {
             .map(|at| std::array::from_fn(|c| direct.pixels[at][c] + indirect.pixels[at][c] + sky[at][c]))
             .collect();
         let means = [&direct.pixels, &indirect.pixels, &sky].map(|pixels| mean(pixels));
-        let all: f64 = means.iter().sum();
+        let all = mean(&whole.pixels);
         let share = |of: f64| (all > 0.0).then(|| 100.0 * of / all);
         let (scene, camera) = view;
         table.push([
@@ -60,6 +68,7 @@ pub(super) fn section(results: &Results) -> Result<Option<Section>> {
             share(means[0]).into(),
             share(means[1]).into(),
             share(means[2]).into(),
+            share(means.iter().sum()).into(),
             all.into(),
             (means[2] > 0.0).then(|| mean(&exact) / means[2]).into(),
         ]);
