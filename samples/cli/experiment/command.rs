@@ -39,7 +39,7 @@ pub struct ReproduceArgs {
     #[arg(long)]
     pub quick: bool,
 
-    /// Size of all pictures, instead of those of the experiment
+    /// Size of all pictures, instead of the sizes that the experiment names
     #[arg(long, value_name = "WxH")]
     pub size: Option<Size>,
 

@@ -64,7 +64,7 @@ pub fn irradiance(stored: &Stored, moment: &Moment) -> Vec<[f32; 3]> {
     out
 }
 
-/// For each texel the source of its light: itself on a surface; the nearest one on a surface in the padding around charts, so that bilinear
+/// For each texel the source of its light: itself on a surface; the nearest texel on a surface in the padding around charts, so that bilinear
 /// filtering finds no dark texels; [`NOWHERE`] elsewhere. Numbers are row · width + column. The faces of a cube are padded each by itself.
 pub fn sources(stored: &Stored) -> Vec<u32> {
     let [width, height] = stored.plan.extent;
