@@ -16,6 +16,7 @@ use lucerna::{
         columns::{Columns, Measured},
         finish,
         layer::{Aim, Layer},
+        lightmap::Corners,
         units,
     },
 };
@@ -161,7 +162,7 @@ fn a_bake_in_blocks_comes_back_from_its_file_and_lights_pictures_as_one_without(
         for format in [Texels::Bc5, Texels::Bc6h, Texels::Blocks] {
             let plan = of(format);
             let tiles = finish::tiles(&plan, &gathered, |_| Ok(())).unwrap();
-            let stored = Stored { plan, tiles, probes: Vec::new(), corners: Vec::new() };
+            let stored = Stored { plan, tiles, probes: Vec::new(), corners: Corners::default() };
             let (ours, theirs) = (stored.summary(), plain.summary());
             eprintln!(
                 "{format:?}: {} bytes of {}, {:?}, worst {}",

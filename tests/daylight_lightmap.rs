@@ -11,7 +11,7 @@ use lucerna::{
     image::Layers,
     scene::{Material, Scene, Transform, View},
     techniques::daylight::{
-        Baked, Baking, Group, Kind, PictureSettings, Plan, Sources, Stored, digest, finish,
+        Backs, Baked, Baking, Group, Kind, PictureSettings, Plan, Sources, Stored, digest, finish,
         gathered::Spot,
         lightmap::{self, Unwrapped},
         units,
@@ -19,18 +19,19 @@ use lucerna::{
     tracer::Settings,
 };
 
-fn baking(samples: u32) -> Baking {
+pub fn baking(samples: u32) -> Baking {
     Baking { samples, bounces: 16, roulette: 16, disc: false, diffuse_only: true, ..Baking::default() }
 }
 
-/// The plan of a lightmap with one group of lamps: what glows.
-fn planned(scene: &Scene, glowing: u32, settings: Baking) -> (Plan, Unwrapped) {
-    let unwrapped = lightmap::unwrap(scene, &settings).unwrap();
-    let covered = unwrapped.receivers.len() as u64;
-    let lamps = vec![Group { name: "lamps".into(), lights: Vec::new(), materials: vec![glowing] }];
+/// The plan of a lightmap with one group of lamps: the materials that glow.
+fn planned(gpu: &Gpu, scene: &Scene, glowing: &[u32], settings: Baking) -> (Plan, Unwrapped) {
+    let lamps = vec![Group { name: "lamps".into(), lights: Vec::new(), materials: glowing.to_vec() }];
+    let backs = Backs::lit(gpu, scene, &lamps, &settings).unwrap().lit;
+    let unwrapped = lightmap::unwrap(scene, &settings, &backs).unwrap();
+    let (covered, backs) = (unwrapped.receivers.len() as u64, unwrapped.on_backs());
     let corners = digest(&unwrapped.lightmap.corners);
     let plan = Plan {
-        receivers: Kind::Lightmap { charts: unwrapped.charts, covered, corners },
+        receivers: Kind::Lightmap { charts: unwrapped.charts, covered, backs, corners },
         extent: unwrapped.lightmap.extent,
         lamps,
         ..plan(scene, &eye(), settings)
@@ -39,7 +40,11 @@ fn planned(scene: &Scene, glowing: u32, settings: Baking) -> (Plan, Unwrapped) {
 }
 
 fn lightmap_of(gpu: &Gpu, scene: &Scene, glowing: u32, settings: Baking) -> Baked {
-    let (plan, unwrapped) = planned(scene, glowing, settings);
+    lightmap_lit_by(gpu, scene, &[glowing], settings)
+}
+
+pub fn lightmap_lit_by(gpu: &Gpu, scene: &Scene, glowing: &[u32], settings: Baking) -> Baked {
+    let (plan, unwrapped) = planned(gpu, scene, glowing, settings);
     let sources = Sources::Lightmap(Box::new(unwrapped.by_tile(plan.side())));
     let stored = baked(gpu, scene, plan, sources);
     Baked::new(Stored { corners: unwrapped.lightmap.corners, ..stored })
@@ -47,7 +52,7 @@ fn lightmap_of(gpu: &Gpu, scene: &Scene, glowing: u32, settings: Baking) -> Bake
 
 /// A lightmap whose lamps have the irradiance `of` a position and a normal.
 fn lightmap_with(gpu: &Gpu, scene: &Scene, glowing: u32, settings: Baking, of: impl Fn(Vec3, Vec3) -> f32) -> Baked {
-    let (plan, unwrapped) = planned(scene, glowing, settings);
+    let (plan, unwrapped) = planned(gpu, scene, &[glowing], settings);
     let sources = Sources::Lightmap(Box::new(unwrapped.by_tile(plan.side())));
     let skies = units::skies(&plan).unwrap();
     let mut tiles = lights(gpu, scene, &plan, sources);
@@ -69,7 +74,7 @@ fn lamps_alone() -> PictureSettings {
 }
 
 /// The pixels with an albedo of 0.5: their normals, and their irradiance by the lamps alone.
-fn seen(gpu: &Gpu, scene: &Scene, view: View, baked: &Baked) -> Vec<(Vec3, f32)> {
+pub fn seen(gpu: &Gpu, scene: &Scene, view: View, baked: &Baked) -> Vec<(Vec3, f32)> {
     seen_at(gpu, scene, view, baked).into_iter().map(|(_, normal, irradiance)| (normal, irradiance)).collect()
 }
 
@@ -114,7 +119,7 @@ fn cameras() -> [View; 3] {
 }
 
 /// The least and the largest of some numbers.
-fn range(of: impl Iterator<Item = f32>) -> [f32; 2] {
+pub fn range(of: impl Iterator<Item = f32>) -> [f32; 2] {
     of.fold([f32::MAX, f32::MIN], |[least, most], value| [least.min(value), most.max(value)])
 }
 

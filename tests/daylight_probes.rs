@@ -18,6 +18,7 @@ use lucerna::{
         Added, Baked, Baking, Calendar, Day, Daylight, Kind, Lit, PictureSettings, Plan, Sky, Sources, Stored,
         Transport, Weather, finish,
         gathered::Gathered,
+        lightmap::Corners,
         parts,
         probes::{Brick, DIRECTIONS, Field, Grid, Moment, harmonics, irradiance},
         units,
@@ -300,7 +301,7 @@ pub fn stored_of(gpu: &Gpu, scene: &Scene, plan: Plan) -> Stored {
         Brick::decode(&unit(&mut transport, plan.tile_count() + brick), &plan, count).unwrap()
     });
     let probes = probes.collect();
-    Stored { plan, tiles, probes, corners: Vec::new() }
+    Stored { plan, tiles, probes, corners: Corners::default() }
 }
 
 #[test]

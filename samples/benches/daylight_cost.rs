@@ -29,7 +29,9 @@ use lucerna::{
     measure::{Display, Exposure, Measure, Options, Pair, Picture},
     scene::{Light, LightKind, Node, Pose, Scene, Transform, View},
     technique::{Ready, Shot},
-    techniques::daylight::{Baked, Baking, Daylight, PictureSettings, Plan, Sky, Stored, Transport, units},
+    techniques::daylight::{
+        Baked, Baking, Daylight, PictureSettings, Plan, Sky, Stored, Transport, lightmap::Corners, units,
+    },
     tracer::{self, Filter, Tracer},
 };
 use lucerna_samples::daylight::{DayOptions, KindArg, for_view};
@@ -146,7 +148,7 @@ fn shared(gpu: &Gpu, scene: &Scene, view: &View, plan: &Plan, albedo: &[f32]) ->
             }
         }
     }
-    let stored = Stored { plan: plan.clone(), tiles, probes: Vec::new(), corners: Vec::new() };
+    let stored = Stored { plan: plan.clone(), tiles, probes: Vec::new(), corners: Corners::default() };
     Ok((frames, spent, stored))
 }
 
@@ -323,8 +325,8 @@ fn run() -> Result<()> {
     let view = View::of_camera(&scene, &Pose::rest(&scene), 0, extent)?;
     let day = DayOptions { date: "2026-08-16".into(), ..DayOptions::default() };
     let baking = |seed| Baking { samples, disc: false, seed, ..Baking::default() };
-    let plans =
-        [1, 2].map(|seed| for_view(&day, KindArg::View, &baking(seed), &scene, "0", &view).map(|planned| planned.plan));
+    let plans = [1, 2]
+        .map(|seed| for_view(&gpu, &day, KindArg::View, &baking(seed), &scene, "0", &view).map(|planned| planned.plan));
     let [first, second] = plans;
     let (first, second) = (first?, second?);
     println!("{}, {name} at {}x{}, {}", gpu.describe(), extent[0], extent[1], day.date);

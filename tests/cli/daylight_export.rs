@@ -10,7 +10,7 @@ use lucerna::{
     techniques::daylight::{
         Baking, Calendar, Kind, Lit, Plan, Sky, Stored, Weather, digest,
         layer::Layer,
-        lightmap::{self, Receiver},
+        lightmap::{self, Corners, Receiver},
         parts,
         units::Tile,
     },
@@ -79,7 +79,7 @@ impl Lab {
     fn even(&self, name: &str, irradiance: f32) -> Stored {
         let scene = self.scene();
         let settings = Baking { density: 4.0, tile: 8, ..Baking::default() };
-        let unwrapped = lightmap::unwrap(&scene, &settings).unwrap();
+        let unwrapped = lightmap::unwrap(&scene, &settings, &[]).unwrap();
         let sun = vec3(0.0, 0.8, 0.6);
         let plan = Plan {
             scene: scene.name.clone(),
@@ -87,6 +87,7 @@ impl Lab {
             receivers: Kind::Lightmap {
                 charts: unwrapped.charts,
                 covered: unwrapped.receivers.len() as u64,
+                backs: 0,
                 corners: digest(&unwrapped.lightmap.corners),
             },
             extent: unwrapped.lightmap.extent,
@@ -259,7 +260,7 @@ fn the_scene_has_the_lightmap_as_a_second_set_of_coordinates() {
     let [a, b] = [&before, &after].map(|scene| &scene.meshes[0].primitives[0]);
     assert_eq!(a.indices.len(), b.indices.len());
     let [width, height] = stored.plan.extent.map(|side| side as f32);
-    for (triangle, corners) in stored.corners.iter().enumerate() {
+    for (triangle, corners) in stored.corners.fronts.iter().enumerate() {
         for (corner, wanted) in lightmap::position(*corners).into_iter().enumerate() {
             let [p, q] = [a, b].map(|primitive| primitive.indices[3 * triangle + corner] as usize);
             assert!(a.positions[p].distance(b.positions[q]) < 1e-6);
@@ -413,7 +414,7 @@ fn what_cannot_be_exported_is_refused_and_named() {
         .expect(3, &["even.day", "other geometry"]);
     // A bake of what one camera sees.
     let receivers = Kind::View { camera: "eye".into(), view_from_world: [0.0; 16], clip_from_view: [0.0; 16] };
-    let seen = Stored { plan: Plan { receivers, ..stored.plan.clone() }, corners: Vec::new(), ..stored };
+    let seen = Stored { plan: Plan { receivers, ..stored.plan.clone() }, corners: Corners::default(), ..stored };
     fs::write(lab.at("view.day"), seen.encode().unwrap()).unwrap();
     lab.export("view.day", "out", &[]).expect(3, &["view.day", "one camera", "--kind lightmap or --kind cube"]);
     // Files that are not whole.

@@ -14,6 +14,7 @@ use lucerna::{
         Baked, Baking, Calendar, Day, Daylight, Kind, Light, Lit, PictureSettings, Plan, Sources, Stored, Transport,
         Weather, finish,
         layer::Layer,
+        lightmap::Corners,
         parts,
         units::{self, Tile},
     },
@@ -124,7 +125,7 @@ pub fn stored(scene: &Scene, view: &View, calendar: Calendar, interval: f64, off
         }
     });
     let tiles = tiles.collect();
-    Stored { plan, tiles, probes: Vec::new(), corners: Vec::new() }
+    Stored { plan, tiles, probes: Vec::new(), corners: Corners::default() }
 }
 
 /// The light of all tiles before filter and compression.
@@ -139,7 +140,7 @@ pub fn baked(gpu: &Gpu, scene: &Scene, plan: Plan, sources: Sources) -> Stored {
     let tiles = lights(gpu, scene, &plan, sources);
     let gathered: Vec<_> = tiles.iter().map(|light| units::gathered(&plan, light, &skies).unwrap()).collect();
     let tiles = finish::tiles(&plan, &gathered, |_| Ok(())).unwrap();
-    Stored { plan, tiles, probes: Vec::new(), corners: Vec::new() }
+    Stored { plan, tiles, probes: Vec::new(), corners: Corners::default() }
 }
 
 /// A program that renders frames.

@@ -7,6 +7,8 @@ mod tracer_lab;
 
 #[path = "../daylight_added_lamps.rs"]
 mod daylight_added_lamps;
+#[path = "../daylight_backs.rs"]
+mod daylight_backs;
 #[path = "../daylight_blocks.rs"]
 mod daylight_blocks;
 #[path = "../daylight_cube.rs"]

@@ -98,7 +98,7 @@ impl Light {
     }
 
     /// Whether no light reaches a texel of `count` at any time.
-    fn is_dark(&self, texel: usize, count: usize) -> bool {
+    pub(super) fn is_dark(&self, texel: usize, count: usize) -> bool {
         [&self.sun, &self.sky, &self.lamps].into_iter().all(|rows| {
             let row = rows.len() / count.max(1);
             rows[texel * row..(texel + 1) * row].iter().all(|value| *value == 0.0)

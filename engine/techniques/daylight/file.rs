@@ -9,6 +9,7 @@
 //! | … | the tiles, one after the other ([`Tile::encode`]) |
 //! | … | the bricks of probes, one after the other ([`Brick::encode`]) |
 //! | … | for lightmaps: the corners of all triangles, six numbers of 16 bits each, in sixteenths of a texel |
+//! | … | for lightmaps whose backs have texels: for each such back the number of its triangle, 32 bits, and its corners |
 //! | 32 | BLAKE3 digest of all bytes before |
 //!
 //! Numbers are little-endian.
@@ -21,6 +22,7 @@ use super::{
     Plan,
     columns::DARK,
     finish,
+    lightmap::Corners,
     probes::{self, Brick},
     units,
     units::Tile,
@@ -44,8 +46,8 @@ pub struct Stored {
     pub tiles: Vec<Tile>,
     /// The bricks of probes; empty if the plan has no probes.
     pub probes: Vec<Brick>,
-    /// The lightmap's place of each triangle ([`Lightmap::corners`](super::lightmap::Lightmap::corners)); empty for other bakes.
-    pub corners: Vec<[u16; 6]>,
+    /// The lightmap's place of each triangle; empty for other bakes.
+    pub corners: Corners,
 }
 
 #[derive(Serialize, Deserialize)]
@@ -59,6 +61,9 @@ struct Header {
     probes: Vec<u64>,
     /// Number of triangles with corners.
     triangles: u64,
+    /// Number of triangles whose backs have corners.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    backs: u64,
 }
 
 /// What a bake holds and what it is within.
@@ -98,7 +103,7 @@ impl Stored {
     /// # Errors
     /// `Input`, naming the file, if the folder is of another kind of job, or if a unit is missing or damaged; `OutOfMemory`; the errors of
     /// `told`.
-    pub fn join(store: &Store, corners: Vec<[u16; 6]>, told: impl FnMut(usize) -> Result<()>) -> Result<Self> {
+    pub fn join(store: &Store, corners: Corners, told: impl FnMut(usize) -> Result<()>) -> Result<Self> {
         let job = store.job();
         let wrong = |what: String| Error::input(what).in_file(store.folder());
         if job.key().kind() != units::KIND {
@@ -133,10 +138,11 @@ impl Stored {
             plan: self.plan.clone(),
             tiles: lengths(&tiles),
             probes: lengths(&probes),
-            triangles: self.corners.len() as u64,
+            triangles: self.corners.fronts.len() as u64,
+            backs: self.corners.backs.len() as u64,
         };
         let mut body: Vec<u8> = [tiles, probes].concat().concat();
-        self.corners.iter().flatten().for_each(|number| body.extend_from_slice(&number.to_le_bytes()));
+        body.extend(self.corners.encode());
         FILE.encode(&header, &body)
     }
 
@@ -175,11 +181,11 @@ impl Stored {
                 let what = format!("has {} bricks of probes; its plan has {bricks}", header.probes.len());
                 return Err(damaged(what));
             }
-            let of_corners = header.triangles.checked_mul(12);
+            let of_corners = Corners::bytes(header.triangles, header.backs);
             let mut lengths = header.tiles.iter().chain(&header.probes);
-            Ok(of_corners.and_then(|sum| lengths.try_fold(sum, |sum, length| sum.checked_add(*length))))
+            Ok(lengths.try_fold(of_corners, |sum, length| sum.checked_add(*length)))
         })?;
-        let Header { plan, tiles: lengths, probes: brick_lengths, .. } = header;
+        let Header { plan, tiles: lengths, probes: brick_lengths, triangles, .. } = header;
         let mut tiles = Vec::new();
         for (index, length) in lengths.iter().enumerate() {
             let (tile, after) = rest.split_at(*length as usize);
@@ -195,10 +201,7 @@ impl Stored {
             probes.push(decoded.map_err(|error| error.at(format!("probes[{index}]")))?);
             rest = after;
         }
-        let corners: Vec<[u16; 6]> = rest
-            .chunks_exact(12)
-            .map(|bytes| std::array::from_fn(|i| u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]])))
-            .collect();
+        let corners = Corners::decode(rest, triangles).map_err(damaged)?;
         plan.check_corners(&corners).map_err(|error| damaged(error.to_string()))?;
         Ok(Self { plan, tiles, probes, corners })
     }
@@ -269,7 +272,7 @@ impl Stored {
             raw_bytes: 6 * texels * times as u64,
             bytes: self.tiles.iter().map(|tile| tile.layers().iter().map(|layer| layer.bytes()).sum::<u64>()).sum(),
             kinds: self.kinds(),
-            places_bytes: 12 * self.corners.len() as u64,
+            places_bytes: self.corners.encode().len() as u64,
             images: images as f64 / lit.clone().count().max(1) as f64,
             most_images: self.tiles.iter().map(|tile| tile.sun.images()).max().unwrap_or(0),
             worst_tile: self.tiles.iter().map(|tile| f64::from(tile.sun.worst)).fold(0.0, f64::max),
@@ -290,6 +293,11 @@ fn dark(steps: &[[f64; 2]]) -> f64 {
 
 fn relative(light: f64, square: f64, lines: f64) -> f64 {
     if light > 0.0 { (square / lines).sqrt() / (light / lines) } else { 0.0 }
+}
+
+/// Whether there are none.
+fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 /// Number of probes of a brick.

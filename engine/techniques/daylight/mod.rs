@@ -8,6 +8,7 @@
 pub mod adaptive;
 mod added;
 pub mod atlas;
+mod backs;
 mod baked;
 mod balance;
 pub mod beam;
@@ -50,6 +51,7 @@ mod transport;
 pub mod units;
 
 pub use adaptive::{Adaptive, Comparison};
+pub use backs::Backs;
 pub use baked::Baked;
 pub use beam::Weather;
 pub use blocks::Texels;

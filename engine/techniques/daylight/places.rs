@@ -8,14 +8,16 @@ use crate::{
     passes::gbuffer::GBuffer,
     resident::Handles,
     scene::{Scene, View},
-    shaders::daylight::place,
+    shaders::{daylight::place, types},
 };
 
 /// The corners of all triangles in the lightmap.
 #[derive(Debug)]
 pub(super) struct Places {
     corners: OwnedBuffer,
-    firsts: OwnedBuffer,
+    /// Corners of all fronts, which those of the backs follow; 0: there are none.
+    backs: u32,
+    placed: OwnedBuffer,
     draws: Vec<DrawCall>,
 }
 
@@ -31,13 +33,14 @@ impl Places {
         }
         let triangles = lightmap::triangles(scene);
         let all: u64 = triangles.iter().map(|count| u64::from(*count)).sum();
-        if all != corners.len() as u64 {
-            let what = format!("has places for {} triangles, the scene has {all}", corners.len());
+        if all != corners.fronts.len() as u64 {
+            let what = format!("has places for {} triangles, the scene has {all}", corners.fronts.len());
             return Err(baked.blamed(Error::input(what)));
         }
-        let (mut firsts, mut draws, mut first) = (Vec::new(), Vec::new(), 0);
-        for (number, count) in triangles.into_iter().enumerate() {
-            firsts.push(first);
+        let (mut placed, mut draws, mut first) = (Vec::new(), Vec::new(), 0);
+        for ((number, count), (.., primitive)) in triangles.into_iter().enumerate().zip(lightmap::placed(scene)) {
+            let double_sided = scene.materials.get(primitive.material as usize).is_some_and(|of| of.double_sided);
+            placed.push(types::DayPlaced { first, sides: 1 + u32::from(double_sided) });
             draws.push(DrawCall {
                 first_vertex: first,
                 vertices: 3 * count,
@@ -48,8 +51,9 @@ impl Places {
         }
         draws.retain(|draw| draw.vertices > 0);
         Ok(Some(Self {
-            corners: OwnedBuffer::with_contents(gpu, "daylight.corners", bytemuck::cast_slice(corners))?,
-            firsts: OwnedBuffer::with_contents(gpu, "daylight.firsts", bytemuck::cast_slice(&firsts))?,
+            corners: OwnedBuffer::with_contents(gpu, "daylight.corners", bytemuck::cast_slice(&corners.listed()))?,
+            backs: if corners.backs.is_empty() { 0 } else { first },
+            placed: OwnedBuffer::with_contents(gpu, "daylight.placed", bytemuck::cast_slice(&placed))?,
             draws,
         }))
     }
@@ -64,8 +68,9 @@ impl Places {
             indices: handles.indices,
             positions: handles.positions,
             corners: graph.import_buffer(&self.corners),
-            firsts: graph.import_buffer(&self.firsts),
+            placed: graph.import_buffer(&self.placed),
             depth: gbuffer.depth,
+            push: place::Push { backs: self.backs },
         };
         let targets = Targets::new().color(places, Load::Clear([-1.0; 4])).depth(depth, Depth::Clear(0.0));
         // Sides that the G-buffer does not show are at another depth.

@@ -3,7 +3,7 @@
 use glam::{Mat4, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 
-use super::{Adaptive, Baking, Comparison, Course, SunPath, Weather, cube, probes::Grid};
+use super::{Adaptive, Baking, Comparison, Course, SunPath, Weather, cube, lightmap::Corners, probes::Grid};
 use crate::{
     Error, ErrorKind, Result,
     bake::{Digest, Part},
@@ -44,6 +44,9 @@ pub enum Kind {
         charts: u32,
         /// Texels on surfaces, those included that are left out because they are inside of solids.
         covered: u64,
+        /// Those on backs of two-sided surfaces.
+        #[serde(default)]
+        backs: u64,
         /// Digest of the corners of all triangles.
         corners: Digest,
     },
@@ -349,7 +352,7 @@ impl Plan {
     ///
     /// # Errors
     /// `Input` if they are others.
-    pub fn check_corners(&self, corners: &[[u16; 6]]) -> Result<()> {
+    pub fn check_corners(&self, corners: &Corners) -> Result<()> {
         let wanted = match &self.receivers {
             Kind::View { .. } | Kind::Cube { .. } => Digest::of(&[]),
             Kind::Lightmap { corners, .. } => *corners,
@@ -397,8 +400,8 @@ impl Plan {
 }
 
 /// Digest of the corners of a lightmap.
-pub fn digest(corners: &[[u16; 6]]) -> Digest {
-    Digest::of(bytemuck::cast_slice(&corners.iter().flatten().map(|number| number.to_le_bytes()).collect::<Vec<_>>()))
+pub fn digest(corners: &Corners) -> Digest {
+    Digest::of(&corners.encode())
 }
 
 impl Baking {

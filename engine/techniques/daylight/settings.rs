@@ -72,6 +72,9 @@ pub struct Baking {
     /// Texels along a metre of a surface, for lightmaps.
     #[schemars(range(min = 0.01, max = 1000), extend("x-unit" = "1/m"))]
     pub density: f32,
+    /// For lightmaps: backs of two-sided surfaces have texels of their own where light reaches them. If off, backs show the light of the fronts, and
+    /// the lightmap is smaller.
+    pub backs: bool,
     /// Side of a face, for a camera that turns in place.
     #[schemars(range(min = 8, max = 4096), extend("x-unit" = "texels"))]
     pub face: u32,
@@ -117,6 +120,7 @@ impl Default for Baking {
             format: Texels::default(),
             tile: 32,
             density: 8.0,
+            backs: true,
             face: 256,
             lightmap: 4092,
             probes: 2.0,

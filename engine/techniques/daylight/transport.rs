@@ -206,7 +206,7 @@ impl Transport {
                     + 2 * size_of::<Shut>() as u64)
     }
 
-    /// Goes on with the times of another plan of the same texels.
+    /// Goes on with the times of another plan with the same lamps.
     ///
     /// # Errors
     /// `OutOfMemory`, `DeviceLost`.

@@ -6,7 +6,7 @@ use lucerna::{
     Result,
     gpu::Gpu,
     image,
-    techniques::daylight::{Baking, Cells, Kind, Sources, Stored, Transport, units},
+    techniques::daylight::{Baking, Cells, Kind, Sources, Stored, units},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -67,11 +67,12 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let interrupt = Interrupt::install();
     let stage = Stage::open(&args.stage)?;
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
-    let Planned { mut plan, sources, corners, notes } = plan(&args.day, args.kind, &keys.bake, &stage, &args.stage)?;
-    notes.iter().for_each(|note| console.info(&format!("note: {note}")));
-    plan.validate()?;
     let gpu = Gpu::new(args.run.device.options()?)?;
     console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
+    let Planned { mut plan, sources, corners, backs, notes } =
+        plan(&gpu, &args.day, args.kind, &keys.bake, &stage, &args.stage)?;
+    notes.iter().for_each(|note| console.info(&format!("note: {note}")));
+    plan.validate()?;
     let texels = match &plan.receivers {
         Kind::View { .. } | Kind::Cube { .. } => u64::from(plan.extent[0]) * u64::from(plan.extent[1]),
         Kind::Lightmap { covered, .. } => *covered,
@@ -111,7 +112,7 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
         Sources::View(_) | Sources::Cube(_) => None,
         Sources::Lightmap(texels) => Some(texels.tiles.iter().map(|tile| tile.len() as u64).collect()),
     };
-    let mut transport = Transport::new(&gpu, &stage.scene, &plan, sources)?;
+    let mut transport = backs.transport(&gpu, &stage.scene, &plan, sources)?;
     let adaptive = thin_out(&mut plan, &mut transport)?;
     adaptive.iter().for_each(|(said, _)| console.info(said));
     let memory = Memory::new(&plan, of_tiles.as_deref());

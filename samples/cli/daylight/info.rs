@@ -48,7 +48,10 @@ pub fn info(args: &DayInfoArgs, _: Console) -> Result<ExitCode> {
     let kind = match &plan.receivers {
         Kind::View { camera, .. } => format!("pixels of camera {camera}"),
         Kind::Cube { camera, position: [x, y, z], .. } => format!("cube around camera {camera} at {x}, {y}, {z}"),
-        Kind::Lightmap { charts, covered, .. } => format!("lightmap, {charts} charts, {covered} texels on surfaces"),
+        Kind::Lightmap { charts, covered, backs, .. } => {
+            let backs = if *backs == 0 { String::new() } else { format!(", {backs} of them on backs") };
+            format!("lightmap, {charts} charts, {covered} texels on surfaces{backs}")
+        }
     };
     let calendar = &plan.calendar;
     console::print(&format!("scene      {}, {kind}", plan.scene))?;

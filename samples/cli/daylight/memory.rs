@@ -84,12 +84,17 @@ mod tests {
     };
 
     use super::*;
-    use crate::daylight::{DayOptions, KindArg, for_view};
+    use crate::daylight::{
+        DayOptions,
+        plan::{Receivers, planned},
+    };
 
     fn plan(size: u32) -> Plan {
         let scene = lucerna_scenes::load("cornell").unwrap();
         let view = View::of_camera(&scene, &Pose::rest(&scene), 0, [size, size]).unwrap();
-        for_view(&DayOptions::default(), KindArg::View, &Baking::default(), &scene, "0", &view).unwrap().plan
+        planned(&DayOptions::default(), &Baking::default(), &scene, |_| Ok(Receivers::of_view("0", &view)))
+            .unwrap()
+            .plan
     }
 
     #[test]

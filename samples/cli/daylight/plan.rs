@@ -5,10 +5,14 @@ use std::{path::PathBuf, str::FromStr};
 use glam::Vec3;
 use lucerna::{
     Error, Result,
+    gpu::Gpu,
     scene::{Aabb, Scene, View},
     techniques::daylight::{
-        Adaptive, Baking, Calendar, Cells, Course, Day, Kind, Lit, MOST_TIMES, NEXT_DAY, Plan, Sources, SunPath,
-        SunPoint, Transport, Weather, adaptive, cube, digest, lamps, lightmap, parts, probes::Grid,
+        Adaptive, Backs, Baking, Calendar, Cells, Course, Day, Group, Kind, Lit, MOST_TIMES, NEXT_DAY, Plan, Sources,
+        SunPath, SunPoint, Transport, Weather, adaptive, cube, digest, lamps,
+        lightmap::{self, Corners},
+        parts,
+        probes::Grid,
     },
 };
 use serde::{Deserialize, Serialize};
@@ -90,7 +94,7 @@ pub struct DayOptions {
     /// The box in which probes stand, two opposite corners in metres [default: the box around the scene]
     #[arg(long, value_name = "X,Y,Z,X,Y,Z", allow_hyphen_values = true, help_heading = "Bake")]
     #[serde(skip)]
-    pub probe_box: Option<Corners>,
+    pub probe_box: Option<BoxArg>,
 }
 
 impl DayOptions {
@@ -173,9 +177,9 @@ fn lit(steps: &[f64], calendar: &Calendar, (day, course): (usize, &Course), baki
 
 /// A box: two opposite corners, metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Corners(Aabb);
+pub struct BoxArg(Aabb);
 
-impl FromStr for Corners {
+impl FromStr for BoxArg {
     type Err = String;
 
     fn from_str(text: &str) -> std::result::Result<Self, String> {
@@ -238,28 +242,31 @@ pub enum KindArg {
 pub struct Planned {
     pub plan: Plan,
     pub sources: Sources,
-    pub corners: Vec<[u16; 6]>,
+    pub corners: Corners,
+    /// Those of a lightmap, which has begun what gathers the light ([`Backs::transport`]).
+    pub backs: Backs,
     pub notes: Vec<String>,
 }
 
 /// The surfaces of a bake, and their texels.
-struct Receivers {
+pub(super) struct Receivers {
     kind: Kind,
     extent: [u32; 2],
     sources: Sources,
-    corners: Vec<[u16; 6]>,
+    corners: Corners,
+    backs: Backs,
     notes: Vec<String>,
 }
 
 impl Receivers {
-    fn of_view(camera: &str, view: &View) -> Self {
+    pub(super) fn of_view(camera: &str, view: &View) -> Self {
         let kind = Kind::View {
             camera: camera.to_owned(),
             view_from_world: view.view_from_world.to_cols_array(),
             clip_from_view: view.clip_from_view.to_cols_array(),
         };
         let sources = Sources::View(Box::new(*view));
-        Self { kind, extent: view.extent, sources, corners: Vec::new(), notes: Vec::new() }
+        Self::of_pixels(kind, view.extent, sources)
     }
 
     fn around(camera: &str, view: &View, baking: &Baking) -> Result<Self> {
@@ -271,22 +278,29 @@ impl Receivers {
         let kind = Kind::Cube { camera: camera.to_owned(), position: position.to_array(), near };
         let sources = Sources::Cube(Box::new(cube::views(position, near, baking.face)));
         let extent = [cube::FACES * baking.face, baking.face];
-        Ok(Self { kind, extent, sources, corners: Vec::new(), notes: Vec::new() })
+        Ok(Self::of_pixels(kind, extent, sources))
     }
 
-    fn of_lightmap(scene: &Scene, baking: &Baking) -> Result<Self> {
-        let unwrapped = lightmap::unwrap(scene, baking)?;
+    fn of_pixels(kind: Kind, extent: [u32; 2], sources: Sources) -> Self {
+        Self { kind, extent, sources, corners: Corners::default(), backs: Backs::none(), notes: Vec::new() }
+    }
+
+    fn of_lightmap(gpu: &Gpu, scene: &Scene, baking: &Baking, groups: &[Group]) -> Result<Self> {
+        let backs = Backs::lit(gpu, scene, groups, baking)?;
+        let unwrapped = lightmap::unwrap(scene, baking, &backs.lit)?;
         let corners = unwrapped.lightmap.corners.clone();
-        let kind = Kind::Lightmap {
-            charts: unwrapped.charts,
-            covered: unwrapped.receivers.len() as u64,
-            corners: digest(&corners),
-        };
+        let (covered, on_backs) = (unwrapped.receivers.len() as u64, unwrapped.on_backs());
+        let kind = Kind::Lightmap { charts: unwrapped.charts, covered, backs: on_backs, corners: digest(&corners) };
         let extent = unwrapped.lightmap.extent;
         let side = if baking.tile == 0 { extent[0].max(extent[1]) } else { baking.tile };
         let sources = Sources::Lightmap(Box::new(unwrapped.by_tile(side.max(1))));
-        let notes = unwrapped.notes.iter().map(|note| format!("lightmap: {note}")).collect();
-        Ok(Self { kind, extent, sources, corners, notes })
+        let mut notes: Vec<String> = unwrapped.notes.iter().map(|note| format!("lightmap: {note}")).collect();
+        if on_backs > 0 {
+            notes.push(format!(
+                "{on_backs} of {covered} texels are on the backs of two-sided surfaces; -D bake.backs=false leaves them out"
+            ));
+        }
+        Ok(Self { kind, extent, sources, corners, backs, notes })
     }
 }
 
@@ -294,8 +308,15 @@ impl Receivers {
 ///
 /// # Errors
 /// `Usage` for an impossible day or lightmap; `Input` if the scene has no surfaces.
-pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage, args: &StageArgs) -> Result<Planned> {
-    planned(options, baking, &stage.scene, || match kind {
+pub fn plan(
+    gpu: &Gpu,
+    options: &DayOptions,
+    kind: KindArg,
+    baking: &Baking,
+    stage: &Stage,
+    args: &StageArgs,
+) -> Result<Planned> {
+    planned(options, baking, &stage.scene, |groups| match kind {
         KindArg::View => {
             let (_, view) = stage.at(args.time, args.size)?;
             Ok(Receivers::of_view(&stage.placed.name, &view))
@@ -304,7 +325,7 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
             let (_, view) = stage.at(args.time, args.size)?;
             Receivers::around(&stage.placed.name, &view, baking)
         }
-        KindArg::Lightmap => Receivers::of_lightmap(&stage.scene, baking),
+        KindArg::Lightmap => Receivers::of_lightmap(gpu, &stage.scene, baking, groups),
     })
 }
 
@@ -313,6 +334,7 @@ pub fn plan(options: &DayOptions, kind: KindArg, baking: &Baking, stage: &Stage,
 /// # Errors
 /// As `plan`.
 pub fn for_view(
+    gpu: &Gpu,
     options: &DayOptions,
     kind: KindArg,
     baking: &Baking,
@@ -320,18 +342,22 @@ pub fn for_view(
     camera: &str,
     view: &View,
 ) -> Result<Planned> {
-    planned(options, baking, scene, || match kind {
+    planned(options, baking, scene, |groups| match kind {
         KindArg::View => Ok(Receivers::of_view(camera, view)),
         KindArg::Cube => Receivers::around(camera, view, baking),
-        KindArg::Lightmap => Receivers::of_lightmap(scene, baking),
+        KindArg::Lightmap => Receivers::of_lightmap(gpu, scene, baking, groups),
     })
 }
 
-fn planned(
+/// The plan for the surfaces that `receivers` makes for groups of lamps.
+///
+/// # Errors
+/// As `plan`.
+pub(super) fn planned(
     options: &DayOptions,
     baking: &Baking,
     scene: &Scene,
-    receivers: impl FnOnce() -> Result<Receivers>,
+    receivers: impl FnOnce(&[Group]) -> Result<Receivers>,
 ) -> Result<Planned> {
     if lightmap::triangles(scene).iter().all(|count| *count == 0) {
         return Err(Error::input("the scene has no surfaces, so there is nothing to bake"));
@@ -351,7 +377,8 @@ fn planned(
         }
         times.extend(lit(&of_day, &calendar, (day, course), baking));
     }
-    let Receivers { kind, extent, sources, corners, mut notes } = receivers()?;
+    let lamps = if options.no_lamps { Vec::new() } else { lamps::groups(scene, &options.lamp)? };
+    let Receivers { kind, extent, sources, corners, backs, mut notes } = receivers(&lamps)?;
     let probes = match (baking.probes > 0.0, options.probe_box) {
         (true, given) => {
             let around = given.map(|corners| corners.0).or_else(|| Grid::around(scene, baking.probes));
@@ -376,7 +403,7 @@ fn planned(
         steps: steps as u32,
         times,
         weather: Weather::default(),
-        lamps: if options.no_lamps { Vec::new() } else { lamps::groups(scene, &options.lamp)? },
+        lamps,
         settings: baking.clone(),
     };
     plan.check_whole()?;
@@ -384,7 +411,7 @@ fn planned(
     if plan.settings.adaptive == Adaptive::Off {
         Cells::new(scene, &plan.settings, plan.times.len())?;
     }
-    Ok(Planned { plan, sources, corners, notes })
+    Ok(Planned { plan, sources, corners, backs, notes })
 }
 
 /// Leaves out the steps that interpolation replaces ([`adaptive`]), and says so in a line for the user; `None` if all steps are wanted.

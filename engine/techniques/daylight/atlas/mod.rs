@@ -6,6 +6,7 @@
 //! order.
 
 mod chart;
+mod connected;
 mod dilate;
 mod groups;
 mod layout;
@@ -23,6 +24,7 @@ use std::collections::BTreeMap;
 
 use glam::{DMat3, Mat4, Vec2, Vec3};
 
+pub use connected::connected;
 pub use dilate::padding_sources;
 pub use raster::{Texel, texels};
 pub(super) use raster::{spread, touched_by};
@@ -43,11 +45,13 @@ pub struct MeshInput<'a> {
 
 /// A mesh in the scene.
 #[derive(Clone, Copy, Debug)]
-pub struct Instance {
+pub struct Instance<'a> {
     /// The index of the mesh.
     pub mesh: usize,
     /// The map from object space to world space in metres. It may mirror and scale.
     pub world_from_object: Mat4,
+    /// Whether each triangle needs texels; `None`: all do. Charts without such a triangle are left out.
+    pub wanted: Option<&'a [bool]>,
 }
 
 /// The wishes of the caller.
@@ -92,9 +96,9 @@ pub struct Atlas {
     pub height: u32,
     /// The corners of every triangle in texels: all triangles of instance 0, then of instance 1, and so on.
     ///
-    /// The centre of the first texel is (0.5, 0.5).
+    /// The centre of the first texel is (0.5, 0.5). Triangles of a chart that was left out have infinite corners.
     pub corners: Vec<[Vec2; 3]>,
-    /// The chart of every triangle, in the order of the corners.
+    /// The chart of every triangle, in the order of the corners; `u32::MAX`: it was left out.
     pub triangle_charts: Vec<u32>,
     /// The number of charts.
     pub charts: u32,
@@ -108,7 +112,7 @@ pub struct Atlas {
 ///
 /// It fails if the input is empty or not finite, if an index is out of range, or if the charts do not fit into
 /// `settings.max_size`. The last error names the texel density that fits.
-pub fn build(meshes: &[MeshInput], instances: &[Instance], settings: &Settings) -> Result<Atlas, String> {
+pub fn build(meshes: &[MeshInput], instances: &[Instance<'_>], settings: &Settings) -> Result<Atlas, String> {
     check_settings(settings)?;
     for (index, mesh) in meshes.iter().enumerate() {
         check_mesh(index, mesh)?;
@@ -134,7 +138,7 @@ pub fn build(meshes: &[MeshInput], instances: &[Instance], settings: &Settings) 
             layouts.push(layout::layout(&surface, &source, &mut notes));
             layouts.len() - 1
         });
-        placed.push(place::Placed { layout, scale, triangles: mesh.triangles.len() });
+        placed.push(place::Placed { layout, scale, triangles: mesh.triangles.len(), wanted: instance.wanted });
     }
     place::place(&layouts, &placed, settings, notes)
 }
@@ -195,7 +199,7 @@ fn check_mesh(index: usize, mesh: &MeshInput) -> Result<(), String> {
 }
 
 /// Checks all instances and the total number of triangles.
-fn check_instances(meshes: &[MeshInput], instances: &[Instance]) -> Result<(), String> {
+fn check_instances(meshes: &[MeshInput], instances: &[Instance<'_>]) -> Result<(), String> {
     let mut total = 0_u64;
     for (index, instance) in instances.iter().enumerate() {
         let Some(mesh) = meshes.get(instance.mesh) else {
@@ -209,6 +213,16 @@ fn check_instances(meshes: &[MeshInput], instances: &[Instance]) -> Result<(), S
             return Err(format!(
                 "Instance {index} has a transform that is not finite, but a lightmap needs a finite one. Repair the \
                  transform."
+            ));
+        }
+        if let Some(wanted) = instance.wanted
+            && wanted.len() != mesh.triangles.len()
+        {
+            return Err(format!(
+                "Instance {index} chooses among {} triangles, but its mesh has {}. Say for each triangle whether it \
+                 needs texels.",
+                wanted.len(),
+                mesh.triangles.len()
             ));
         }
         total += mesh.triangles.len() as u64;

@@ -4,7 +4,8 @@ use glam::{DVec2, Vec2};
 
 use super::{
     Atlas, Settings,
-    layout::Layout,
+    chart::Chart,
+    layout::{Collapsed, Layout},
     pack::{Item, Packing, pack},
 };
 
@@ -18,14 +19,37 @@ const MAX_EXTENT: f64 = 16_777_216.0;
 const SEARCH_ROUNDS: u32 = 12;
 
 /// An instance and its layout.
-pub(super) struct Placed {
+pub(super) struct Placed<'a> {
     /// The index of the layout.
     pub(super) layout: usize,
     /// The mean scale of the instance in metres per object unit.
     pub(super) scale: f64,
     /// The number of triangles.
     pub(super) triangles: usize,
+    /// Whether each triangle needs texels; `None`: all do.
+    pub(super) wanted: Option<&'a [bool]>,
 }
+
+impl Placed<'_> {
+    /// Tells whether a triangle needs texels.
+    fn wants(&self, triangle: u32) -> bool {
+        self.wanted.is_none_or(|wanted| wanted[triangle as usize])
+    }
+
+    /// Gives the charts with a triangle that needs texels.
+    fn charts<'l>(&self, layouts: &'l [Layout]) -> impl Iterator<Item = &'l Chart> {
+        layouts[self.layout].charts.iter().filter(|chart| chart.triangles.iter().any(|triangle| self.wants(*triangle)))
+    }
+
+    /// Tells whether a degenerate triangle stands alone and needs a chart of one texel.
+    fn needs_point(&self, layouts: &[Layout]) -> bool {
+        let alone = |collapsed: &Collapsed| collapsed.onto.is_none() && self.wants(collapsed.triangle);
+        layouts[self.layout].collapsed.iter().any(alone)
+    }
+}
+
+/// The place of triangles of a chart that was left out.
+const NOWHERE: [Vec2; 3] = [Vec2::INFINITY; 3];
 
 /// The extent of a chart along one axis in texels.
 #[derive(Clone, Copy)]
@@ -53,7 +77,7 @@ impl Extent {
 /// Scales and packs all charts and gives the atlas.
 pub(super) fn place(
     layouts: &[Layout],
-    placed: &[Placed],
+    placed: &[Placed<'_>],
     settings: &Settings,
     notes: Vec<String>,
 ) -> Result<Atlas, String> {
@@ -76,10 +100,10 @@ pub(super) fn place(
     for instance in placed {
         let layout = &layouts[instance.layout];
         let base = atlas.corners.len();
-        atlas.corners.resize(base + instance.triangles, [Vec2::ZERO; 3]);
-        atlas.triangle_charts.resize(base + instance.triangles, 0);
+        atlas.corners.resize(base + instance.triangles, NOWHERE);
+        atlas.triangle_charts.resize(base + instance.triangles, u32::MAX);
         let scale = density * instance.scale;
-        for chart in &layout.charts {
+        for chart in instance.charts(layouts) {
             let place = places.next().expect("every chart has a place");
             let (x, y) = (Extent::new(chart.size.x * scale), Extent::new(chart.size.y * scale));
             let factor = DVec2::new(x.factor, y.factor) * scale;
@@ -95,7 +119,7 @@ pub(super) fn place(
             }
             chart_number += 1;
         }
-        let lonely = layout.needs_point().then(|| {
+        let lonely = instance.needs_point(layouts).then(|| {
             let place = places.next().expect("the lonely triangles have a place");
             chart_number += 1;
             (origin(place.x, place.y, settings) + 0.5).as_vec2()
@@ -105,25 +129,24 @@ pub(super) fn place(
             let (point, chart) = match collapsed.onto {
                 Some((triangle, corner)) => {
                     let corners = atlas.corners[base + triangle as usize];
+                    if corners == NOWHERE {
+                        continue;
+                    }
                     // A point just inside the neighbour lies in a texel that the neighbour covers.
                     let centre = (corners[0] + corners[1] + corners[2]) / 3.0;
                     let inside = corners[corner].lerp(centre, 0.01);
                     (inside.floor() + 0.5, atlas.triangle_charts[base + triangle as usize])
                 }
-                None => (lonely.unwrap_or_default(), chart_number - 1),
+                None => match lonely {
+                    Some(point) => (point, chart_number - 1),
+                    None => continue,
+                },
             };
             atlas.corners[target] = [point; 3];
             atlas.triangle_charts[target] = chart;
         }
     }
     Ok(atlas)
-}
-
-impl Layout {
-    /// Tells whether a degenerate triangle stands alone and needs a chart of one texel.
-    fn needs_point(&self) -> bool {
-        self.collapsed.iter().any(|collapsed| collapsed.onto.is_none())
-    }
 }
 
 /// Gives the width of the free border at the left and at the top in texels.
@@ -148,12 +171,11 @@ fn limit(settings: &Settings) -> u64 {
 }
 
 /// Packs all charts at a density, or gives nothing if a chart is too large to count.
-fn pack_at(layouts: &[Layout], placed: &[Placed], settings: &Settings, density: f64) -> Option<Packing> {
+fn pack_at(layouts: &[Layout], placed: &[Placed<'_>], settings: &Settings, density: f64) -> Option<Packing> {
     let mut items = Vec::new();
     let blocks = |texels: u32| (texels + settings.padding).div_ceil(settings.block);
     for instance in placed {
-        let layout = &layouts[instance.layout];
-        for chart in &layout.charts {
+        for chart in instance.charts(layouts) {
             let size = chart.size * (density * instance.scale);
             if size.is_nan() || size.max_element() > MAX_EXTENT {
                 return None;
@@ -161,7 +183,7 @@ fn pack_at(layouts: &[Layout], placed: &[Placed], settings: &Settings, density: 
             let (x, y) = (Extent::new(size.x), Extent::new(size.y));
             items.push(Item { width: blocks(x.texels), height: blocks(y.texels) });
         }
-        if layout.needs_point() {
+        if instance.needs_point(layouts) {
             items.push(Item { width: blocks(1), height: blocks(1) });
         }
     }
@@ -174,7 +196,7 @@ fn pack_at(layouts: &[Layout], placed: &[Placed], settings: &Settings, density: 
 }
 
 /// Says what size the charts need and what density fits.
-fn too_large(layouts: &[Layout], placed: &[Placed], settings: &Settings) -> String {
+fn too_large(layouts: &[Layout], placed: &[Placed<'_>], settings: &Settings) -> String {
     let wanted = f64::from(settings.texels_per_metre);
     let fits = |density: f64| {
         pack_at(layouts, placed, settings, density).is_some_and(|p| atlas_side(p.side(), settings) <= limit(settings))
@@ -191,11 +213,11 @@ fn too_large(layouts: &[Layout], placed: &[Placed], settings: &Settings) -> Stri
     // At the low end every chart takes one texel.
     let largest = placed
         .iter()
-        .flat_map(|p| layouts[p.layout].charts.iter().map(|chart| chart.size.max_element() * p.scale))
+        .flat_map(|p| p.charts(layouts).map(|chart| chart.size.max_element() * p.scale))
         .fold(0.0, f64::max);
     let (mut low, mut high) = (wanted.min(0.5 / largest), wanted);
     if !fits(low) {
-        let charts: usize = placed.iter().map(|p| layouts[p.layout].charts.len()).sum();
+        let charts: usize = placed.iter().map(|p| p.charts(layouts).count()).sum();
         return format!(
             "{problem} Its {charts} charts do not fit at any density, because each takes at least one texel and its \
              padding. Raise max_size, lower padding, or give meshes with fewer separate parts."

@@ -130,7 +130,7 @@ fn is_flat(corners: &[DVec2; 3]) -> bool {
     (corners[1] - corners[0]).perp_dot(corners[2] - corners[0]) == 0.0
 }
 
-/// The triangles sorted by their first row.
+/// The triangles with a place, sorted by their first row.
 struct Rows {
     starts: Vec<usize>,
     triangles: Vec<u32>,
@@ -140,15 +140,16 @@ impl Rows {
     fn new(atlas: &Atlas) -> Self {
         let first = |corners: &[Vec2; 3]| row_range(corners).0.min(atlas.height.saturating_sub(1)) as usize;
         let mut starts = vec![0; atlas.height as usize + 1];
-        for corners in &atlas.corners {
+        let placed = || atlas.corners.iter().enumerate().filter(|(_, corners)| corners[0].is_finite());
+        for (_, corners) in placed() {
             starts[first(corners) + 1] += 1;
         }
         for row in 0..atlas.height as usize {
             starts[row + 1] += starts[row];
         }
         let mut next = starts.clone();
-        let mut triangles = vec![0; atlas.corners.len()];
-        for (index, corners) in atlas.corners.iter().enumerate() {
+        let mut triangles = vec![0; starts[atlas.height as usize]];
+        for (index, corners) in placed() {
             let slot = &mut next[first(corners)];
             triangles[*slot] = index as u32;
             *slot += 1;

@@ -79,7 +79,7 @@ impl Surface {
 }
 
 /// Gives the welded vertex of every vertex, and the first vertex of every welded vertex.
-fn weld(positions: &[Vec3]) -> (Vec<u32>, Vec<u32>) {
+pub(super) fn weld(positions: &[Vec3]) -> (Vec<u32>, Vec<u32>) {
     // The sum with zero turns -0 into 0, so that both weld.
     let key = |vertex: u32| (positions[vertex as usize] + Vec3::ZERO).to_array().map(f32::to_bits);
     let mut order: Vec<u32> = (0..positions.len() as u32).collect();

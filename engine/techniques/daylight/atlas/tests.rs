@@ -63,8 +63,8 @@ pub(super) fn sphere(columns: u32, rows: u32) -> Mesh {
     mesh
 }
 
-pub(super) fn at(mesh: usize, world_from_object: Mat4) -> Instance {
-    Instance { mesh, world_from_object }
+pub(super) fn at(mesh: usize, world_from_object: Mat4) -> Instance<'static> {
+    Instance { mesh, world_from_object, wanted: None }
 }
 
 pub(super) fn settings(texels_per_metre: f32) -> Settings {
@@ -287,4 +287,27 @@ fn places_of_a_texel_are_spread_over_the_part_of_it_that_charts_cover() {
     assert!(cut.iter().all(|p| p.x + p.y <= 6.0 + 1e-5), "{cut:?}");
     assert!(cut.iter().any(|p| p.x + p.y < 5.6) && cut.len() < 16, "{cut:?}");
     assert_eq!(at([5, 5]), []);
+}
+
+#[test]
+fn charts_without_a_wanted_triangle_are_left_out() {
+    // A cube of two metres has six charts of two triangles each.
+    let cube = cuboid(Vec3::splat(2.0));
+    let count = cube.triangles.len();
+    let wanted: Vec<bool> = (0..count).map(|triangle| triangle == 3).collect();
+    let back = Instance { wanted: Some(&wanted), ..at(0, Mat4::IDENTITY) };
+    let inputs = [cube.input()];
+    let atlas = build(&inputs, &[at(0, Mat4::IDENTITY), back], &settings(4.0)).unwrap();
+    let whole = build(&inputs, &[at(0, Mat4::IDENTITY), at(0, Mat4::IDENTITY)], &settings(4.0)).unwrap();
+    assert_eq!((atlas.charts, whole.charts), (7, 12));
+    let placed: Vec<usize> = (count..2 * count).filter(|t| atlas.corners[*t][0].is_finite()).collect();
+    assert!(placed.len() == 2 && placed.contains(&(count + 3)), "{placed:?}");
+    for triangle in count..2 * count {
+        assert_eq!(atlas.triangle_charts[triangle] == u32::MAX, !placed.contains(&triangle));
+    }
+    let of = |atlas: &Atlas| texels(atlas).len();
+    assert_eq!(of(&atlas) * 12, of(&whole) * 7);
+    assert!(texels(&atlas).iter().all(|texel| atlas.corners[texel.triangle as usize][0].is_finite()));
+    let none = Instance { wanted: Some(&wanted[1..]), ..back };
+    assert!(build(&inputs, &[none], &settings(4.0)).unwrap_err().contains("chooses among 11 triangles"));
 }

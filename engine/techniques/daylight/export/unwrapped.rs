@@ -4,7 +4,10 @@ use std::collections::HashMap;
 
 use glam::Vec2;
 
-use super::super::{Stored, lightmap};
+use super::super::{
+    Stored,
+    lightmap::{self, Corners},
+};
 use crate::{
     Error, Result,
     scene::{MAX_UV_SETS, Material, Mesh, MorphTarget, Primitive, Scene},
@@ -23,14 +26,17 @@ pub struct Unwrapping {
 /// Gives each mesh of a node coordinates in the lightmap. Each node gets a mesh of its own, because instances have different places, and
 /// vertices are split where charts end. No texture of the scene uses the set of coordinates.
 ///
+/// If backs have texels of their own, two-sided materials become one-sided, and the backs that have texels become further primitives that face the
+/// other way. Unlit materials stay as they are.
+///
 /// # Errors
 /// `Input` if the bake is no lightmap of this scene, or if textures use all sets of coordinates.
 pub fn unwrapped(scene: &Scene, stored: &Stored) -> Result<Unwrapping> {
-    let corners = &stored.corners;
+    let Corners { fronts, backs } = &stored.corners;
     let counts = lightmap::triangles(scene);
     let all: u64 = counts.iter().map(|count| u64::from(*count)).sum();
-    if corners.is_empty() || all != corners.len() as u64 {
-        return Err(Error::input(format!("has places for {} triangles, the scene has {all}", corners.len())));
+    if fronts.is_empty() || all != fronts.len() as u64 {
+        return Err(Error::input(format!("has places for {} triangles, the scene has {all}", fronts.len())));
     }
     let Some(uv_set) = free_set(&scene.materials) else {
         return Err(Error::input(format!("textures use all {MAX_UV_SETS} sets of texture coordinates"))
@@ -39,24 +45,33 @@ pub fn unwrapped(scene: &Scene, stored: &Stored) -> Result<Unwrapping> {
     let [width, height] = stored.plan.extent;
     let scale = Vec2::new(1.0 / width as f32, 1.0 / height as f32);
     let mut out = scene.clone();
+    if !backs.is_empty() {
+        out.materials.iter_mut().for_each(|material| material.double_sided &= material.unlit);
+    }
     out.meshes.clear();
     let mut vertices = [0, 0];
     let mut first = 0;
     for node in 0..scene.nodes.len() {
         let Some(mesh) = scene.nodes[node].mesh.and_then(|mesh| scene.meshes.get(mesh as usize)) else { continue };
         let known = |primitive: &&Primitive| (primitive.material as usize) < scene.materials.len();
-        let primitives = mesh.primitives.iter().filter(known).map(|primitive| {
+        let mut primitives = Vec::new();
+        for primitive in mesh.primitives.iter().filter(known) {
             let count = primitive.indices.len() / 3;
-            let places = corners.get(first..first + count).unwrap_or_default();
+            let of_fronts = (0..).zip(fronts.get(first..first + count).unwrap_or_default().iter().copied());
+            let split_fronts = split(primitive, of_fronts, uv_set as usize, scale);
+            let [from, until] =
+                [first, first + count].map(|end| backs.partition_point(|(triangle, _)| (*triangle as usize) < end));
+            let of_backs = backs[from..until].iter().map(|(triangle, place)| (*triangle as usize - first, *place));
+            let split_backs = (from < until).then(|| turned(split(primitive, of_backs, uv_set as usize, scale)));
             first += count;
-            let split = split(primitive, places, uv_set as usize, scale);
             vertices[0] += primitive.positions.len();
-            vertices[1] += split.positions.len();
-            split
-        });
-        let mesh = Mesh { name: mesh.name.clone(), primitives: primitives.collect(), weights: mesh.weights.clone() };
+            for split in [Some(split_fronts), split_backs].into_iter().flatten() {
+                vertices[1] += split.positions.len();
+                primitives.push(split);
+            }
+        }
         out.nodes[node].mesh = Some(out.meshes.len() as u32);
-        out.meshes.push(mesh);
+        out.meshes.push(Mesh { name: mesh.name.clone(), primitives, weights: mesh.weights.clone() });
     }
     Ok(Unwrapping { scene: out, uv_set, vertices })
 }
@@ -82,13 +97,18 @@ fn uv_sets(material: &Material) -> impl Iterator<Item = u32> {
     .map(|texture| texture.uv_set)
 }
 
-/// The primitive with a vertex for each pair of a vertex and a place in the lightmap.
-fn split(primitive: &Primitive, places: &[[u16; 6]], uv_set: usize, scale: Vec2) -> Primitive {
+/// Some triangles of a primitive, with a vertex for each pair of a vertex and a place in the lightmap. `places`: of the triangles with these numbers.
+fn split(
+    primitive: &Primitive,
+    places: impl Iterator<Item = (usize, [u16; 6])>,
+    uv_set: usize,
+    scale: Vec2,
+) -> Primitive {
     let mut known: HashMap<(u32, [u16; 2]), u32> = HashMap::new();
     let (mut from, mut uvs, mut indices) = (Vec::new(), Vec::new(), Vec::new());
-    for (triangle, place) in primitive.indices.chunks_exact(3).zip(places) {
-        let at = lightmap::position(*place);
-        for (corner, vertex) in triangle.iter().enumerate() {
+    for (triangle, place) in places {
+        let at = lightmap::position(place);
+        for (corner, vertex) in primitive.indices[3 * triangle..3 * triangle + 3].iter().enumerate() {
             let key = (*vertex, [place[2 * corner], place[2 * corner + 1]]);
             indices.push(*known.entry(key).or_insert_with(|| {
                 from.push(*vertex as usize);
@@ -119,6 +139,17 @@ fn split(primitive: &Primitive, places: &[[u16; 6]], uv_set: usize, scale: Vec2)
     }
 }
 
+/// The primitive that faces the other way.
+fn turned(mut primitive: Primitive) -> Primitive {
+    primitive.indices.chunks_exact_mut(3).for_each(|triangle| triangle.swap(1, 2));
+    let morphs = primitive.morphs.iter_mut();
+    let morphed = morphs.flat_map(|morph| morph.normals.iter_mut().chain(&mut morph.tangents));
+    primitive.normals.iter_mut().chain(morphed).for_each(|vector| *vector = -*vector);
+    // With the normal, a tangent and its sign turn, so that the bitangent turns as well: the back shows the detail of the front from behind.
+    primitive.tangents.iter_mut().for_each(|tangent| *tangent = -*tangent);
+    primitive
+}
+
 fn morphed(morph: &MorphTarget, from: &[usize]) -> MorphTarget {
     MorphTarget {
         positions: taken(&morph.positions, from),
@@ -136,7 +167,7 @@ fn taken<T: Copy>(values: &[T], from: &[usize]) -> Vec<T> {
 
 #[cfg(test)]
 mod tests {
-    use glam::{Vec3, vec2};
+    use glam::{Vec3, Vec4, vec2, vec4};
 
     use super::*;
     use crate::scene::TextureRef;
@@ -163,7 +194,7 @@ mod tests {
         let one = [[16, 16, 32, 16, 32, 32], [16, 16, 32, 32, 16, 32]];
         let two = [[16, 16, 32, 16, 32, 32], [80, 16, 96, 32, 80, 32]];
         for (places, vertices) in [(one, 4), (two, 6)] {
-            let split = split(&primitive, &places, 2, vec2(0.1, 0.2));
+            let split = split(&primitive, (0..).zip(places), 2, vec2(0.1, 0.2));
             assert_eq!((split.positions.len(), split.normals.len(), split.uvs.len()), (vertices, vertices, 3));
             assert!(split.uvs[..2].iter().all(|set| *set == vec![Vec2::ZERO; vertices]));
             assert!(split.tangents.is_empty() && split.colors.is_empty());
@@ -172,6 +203,25 @@ mod tests {
                 assert_eq!(primitive.positions[*old as usize], split.positions[*new as usize]);
                 assert!(split.uvs[2][*new as usize].distance(vec2(0.1 * at(0), 0.2 * at(1))) < 1e-6);
             }
+        }
+    }
+    #[test]
+    fn a_back_faces_the_other_way_with_the_detail_of_its_front() {
+        let primitive = Primitive {
+            positions: vec![Vec3::ZERO, Vec3::X, Vec3::ONE, Vec3::Y],
+            normals: vec![Vec3::Z; 4],
+            tangents: vec![vec4(1.0, 0.0, 0.0, -1.0); 4],
+            indices: vec![0, 1, 2, 0, 2, 3],
+            ..Primitive::default()
+        };
+        let back = turned(split(&primitive, [(1, [80, 16, 96, 32, 80, 32])].into_iter(), 1, Vec2::ONE));
+        let [a, b, c] = [0, 1, 2].map(|corner| back.positions[back.indices[corner] as usize]);
+        assert_eq!([a, b, c], [Vec3::ZERO, Vec3::Y, Vec3::ONE], "the second triangle, turned");
+        assert_eq!(back.uvs[1], [vec2(5.0, 1.0), vec2(6.0, 2.0), vec2(5.0, 2.0)]);
+        let bitangent = |normal: Vec3, tangent: Vec4| tangent.w * normal.cross(tangent.truncate());
+        for (normal, tangent) in back.normals.iter().zip(&back.tangents) {
+            assert_eq!((*normal, tangent.truncate()), (-Vec3::Z, -Vec3::X));
+            assert_eq!(bitangent(*normal, *tangent), -bitangent(Vec3::Z, primitive.tangents[0]));
         }
     }
 }

@@ -10,7 +10,7 @@ use lucerna::{
     scene::{Pose, Scene},
     technique::{Ready, Shot},
     techniques::daylight::{
-        Baked, Baking, Daylight, Light, PictureSettings, Plan, Sky, Stored, Transport, finish, probes::Brick, units,
+        Baked, Baking, Daylight, Light, PictureSettings, Plan, Sky, Stored, finish, probes::Brick, units,
     },
 };
 use serde_json::Value;
@@ -88,10 +88,10 @@ fn make(
 ) -> Result<Option<Kept>> {
     let scene = dark(scene);
     let begun = Instant::now();
-    let Planned { plan, sources, corners, .. } = for_view(day, kind, baking, &scene, "view", job.view)?;
+    let Planned { plan, sources, corners, backs, .. } = for_view(gpu, day, kind, baking, &scene, "view", job.view)?;
     plan.validate()?;
     let skies = units::skies(&plan)?;
-    let mut transport = Transport::new(gpu, &scene, &plan, sources)?;
+    let mut transport = backs.transport(gpu, &scene, &plan, sources)?;
     let [columns, rows] = plan.tiles();
     let (mut lights, mut gathered) = (Vec::new(), Vec::new());
     for tile in 0..columns * rows {
