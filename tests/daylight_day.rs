@@ -57,6 +57,41 @@ fn sunrise_and_sunset_in_greenwich_agree_with_an_almanac() {
     }
 }
 
+/// PyEphem 4.2.1, whose planetary theory (VSOP87) is not that of our algorithm: date and UTC, place (degrees), elevation with refraction at 1013 hPa and
+/// 12 °C, azimuth.
+type Almanac = (&'static str, &'static str, &'static str, f64, f64, f64, f64);
+const ALMANAC: [Almanac; 16] = [
+    ("2026-03-20", "12:00", "equator, equinox", 0.0, 0.0, 88.141, 91.400),
+    ("2026-03-20", "08:30", "Copenhagen", 55.676, 12.568, 24.795, 132.773),
+    ("2026-06-21", "11:10", "Copenhagen", 55.676, 12.568, 57.769, 179.339),
+    ("2026-12-21", "09:00", "Copenhagen", 55.676, 12.568, 6.477, 150.772),
+    ("2026-09-23", "02:00", "Sydney", -33.869, 151.209, 56.048, 354.482),
+    ("2026-06-21", "04:00", "Sydney", -33.869, 151.209, 25.682, 328.618),
+    ("2026-12-21", "20:00", "Sydney", -33.869, 151.209, 14.160, 108.985),
+    ("2026-06-21", "00:30", "Longyearbyen, polar day", 78.223, 15.627, 12.578, 21.264),
+    ("2026-12-21", "11:00", "Longyearbyen, polar night", 78.223, 15.627, -11.664, 181.045),
+    ("2026-02-01", "17:00", "Quito", -0.18, -78.468, 71.918, 158.405),
+    ("2026-10-25", "01:30", "London, clock change", 51.507, -0.128, -45.146, 37.967),
+    ("2026-03-29", "06:30", "London, clock change", 51.507, -0.128, 6.628, 92.714),
+    ("2026-08-16", "18:00", "Aalborg", 57.048, 9.919, 6.744, 284.760),
+    ("2000-01-01", "15:00", "New York", 40.713, -74.006, 20.529, 150.731),
+    ("2050-07-04", "21:00", "Los Angeles", 34.052, -118.244, 72.290, 234.586),
+    ("2026-12-21", "03:00", "McMurdo, polar day", -77.846, 166.676, 33.544, 324.087),
+];
+
+#[test]
+fn the_sun_stands_where_another_almanac_says() {
+    for (date, time, name, latitude, longitude, elevation, azimuth) in ALMANAC {
+        let day = Day::new(date, "UTC", latitude, longitude).unwrap();
+        let sun = day.sun(day.parse_time(time).unwrap());
+        let around = ((sun.azimuth - azimuth + 540.0).rem_euclid(360.0) - 180.0) * elevation.to_radians().cos();
+        assert!(around.abs() < 0.01, "{name}, {date} {time}: azimuth {}, not {azimuth}", sun.azimuth);
+        // Programs have different refraction near the horizon, and below it.
+        let slack = if elevation > 0.0 { 0.02 } else { 0.6 };
+        assert!((sun.elevation - elevation).abs() < slack, "{name}, {date} {time}: {}, not {elevation}", sun.elevation);
+    }
+}
+
 #[test]
 fn a_day_with_a_clock_change_has_23_or_25_hours() {
     let spring = Day::new("2026-03-29", "Europe/Copenhagen", 55.676, 12.568).unwrap();

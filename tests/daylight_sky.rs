@@ -324,3 +324,47 @@ fn values_outside_their_ranges_are_refused() {
         assert!(sky.radiance([0.0; 3]).iter().all(|value| value.is_finite()));
     }
 }
+
+/// Mitsuba 3.9.1 (variant `scalar_rgb`, emitter `sunsky` without its sun) evaluates the data of Hosek and Wilkie by itself: turbidity, ground albedo and
+/// elevation of the sun; altitude, and azimuth from the sun; radiance. Mitsuba divides colours by the integral of the luminous efficiency, and has no factor
+/// for a broad band.
+const MITSUBA: [([f64; 3], [f64; 2], [f64; 3]); 20] = [
+    ([3.0, 0.3, 45.0], [90.0, 0.0], [0.02375, 0.04152, 0.08409]),
+    ([3.0, 0.3, 45.0], [60.0, 0.0], [0.08109, 0.10396, 0.14871]),
+    ([3.0, 0.3, 45.0], [30.0, 90.0], [0.04012, 0.0722, 0.13374]),
+    ([3.0, 0.3, 45.0], [20.0, 180.0], [0.05476, 0.09606, 0.16643]),
+    ([3.0, 0.3, 45.0], [10.0, 40.0], [0.1243, 0.18161, 0.25907]),
+    ([2.0, 0.1, 10.0], [90.0, 0.0], [0.00748, 0.01564, 0.02825]),
+    ([2.0, 0.1, 10.0], [60.0, 0.0], [0.01292, 0.02346, 0.03821]),
+    ([2.0, 0.1, 10.0], [30.0, 90.0], [0.02232, 0.03749, 0.05567]),
+    ([2.0, 0.1, 10.0], [20.0, 180.0], [0.04557, 0.06798, 0.08517]),
+    ([2.0, 0.1, 10.0], [10.0, 40.0], [0.08563, 0.10827, 0.10774]),
+    ([6.0, 0.5, 60.0], [90.0, 0.0], [0.08727, 0.10949, 0.15836]),
+    ([6.0, 0.5, 60.0], [60.0, 0.0], [0.50854, 0.53346, 0.49097]),
+    ([6.0, 0.5, 60.0], [30.0, 90.0], [0.07231, 0.10977, 0.18185]),
+    ([6.0, 0.5, 60.0], [20.0, 180.0], [0.07961, 0.12402, 0.20343]),
+    ([6.0, 0.5, 60.0], [10.0, 40.0], [0.18052, 0.2311, 0.31165]),
+    ([10.0, 0.0, 30.0], [90.0, 0.0], [0.04625, 0.05494, 0.07393]),
+    ([10.0, 0.0, 30.0], [60.0, 0.0], [0.20885, 0.20748, 0.18804]),
+    ([10.0, 0.0, 30.0], [30.0, 90.0], [0.06625, 0.07662, 0.09668]),
+    ([10.0, 0.0, 30.0], [20.0, 180.0], [0.05449, 0.06304, 0.08967]),
+    ([10.0, 0.0, 30.0], [10.0, 40.0], [0.32756, 0.2893, 0.24573]),
+];
+
+#[test]
+fn the_clear_sky_is_that_of_another_program_with_the_data_of_its_authors() {
+    const OF_EFFICIENCY: f64 = 106.750_259;
+    for ([turbidity, albedo, elevation], [altitude, azimuth], theirs) in MITSUBA {
+        let sky = sky(Weather::new(turbidity, albedo, 0.0).unwrap(), elevation);
+        let (sine, cosine) = altitude.to_radians().sin_cos();
+        let (east, north) = azimuth.to_radians().sin_cos();
+        let found = sky.radiance([(cosine * east) as f32, sine as f32, (-cosine * north) as f32]);
+        for (found, theirs) in found.into_iter().zip(theirs) {
+            let wanted = theirs * OF_EFFICIENCY * photopic_scale();
+            // Their numbers have five decimals.
+            let rounded = 6e-6 * OF_EFFICIENCY * photopic_scale();
+            let off = (f64::from(found) - wanted).abs();
+            assert!(off < 1e-4 * wanted + rounded, "turbidity {turbidity}, {elevation}°: {found}, not {wanted}");
+        }
+    }
+}
