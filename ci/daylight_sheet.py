@@ -8,8 +8,8 @@ import subprocess
 import sys
 import tempfile
 
-# Scenes have one of the two lightmaps.
-ROWS = ["day", "cube", "lightmap", "coarse lightmap", "day, truth"]
+# Scenes have one of the two lightmaps. The last row is the path tracer.
+ROWS = {"": ["day", "cube", "lightmap", "coarse lightmap", "day, truth"], "-probes": ["probes", "probes, truth"]}
 # Share of the pixels of the path tracer's picture that are darker than the level that is shown as this grey.
 SHARE, GREY = 0.8, 0.5
 GAP = 2
@@ -36,13 +36,13 @@ def exposed(rows, factor):
     return [array.array("f", (1 - math.exp(-factor * max(value, 0)) for value in row)) for row in rows]
 
 
-def sheet(lucerna, folder, runs, layer, output, work):
+def sheet(lucerna, rows, runs, layer, output, work):
     """One column for each time, one row for each method. The exposure is that of the path tracer's picture of all light."""
-    times = sorted({time for _, time in runs})
-    methods = [row for row in ROWS if (row, times[0]) in runs]
+    times = sorted({time for method, time in runs if method == rows[-1]})
+    methods = [row for row in rows if (row, times[0]) in runs]
     columns = []
     for time in times:
-        truth = pixels(lucerna, runs[ROWS[-1], time], "", work)
+        truth = pixels(lucerna, runs[rows[-1], time], "", work)
         greens = sorted(value for row in truth[2] for value in row[1::3])
         factor = -math.log(1 - GREY) / max(greens[int(SHARE * (len(greens) - 1))], 1e-9)
         columns.append([exposed(pixels(lucerna, runs[row, time], layer, work)[2], factor) for row in methods])
@@ -75,8 +75,9 @@ def main():
         scenes.setdefault(run["scene"], {})[run["method"], time] = folder / "runs" / f"{run['key']}.exr"
     with tempfile.TemporaryDirectory() as work:
         for scene, runs in scenes.items():
-            for layer, name in [("", scene), ("indirect", f"{scene}-baked")]:
-                sheet(lucerna, folder, runs, layer, folder / f"{name}.jpg", pathlib.Path(work))
+            for kind, rows in ROWS.items():
+                for layer, suffix in [("", ""), ("indirect", "-baked")]:
+                    sheet(lucerna, rows, runs, layer, folder / f"{scene}{kind}{suffix}.jpg", pathlib.Path(work))
 
 
 main()

@@ -271,6 +271,46 @@ fn the_scene_has_the_lightmap_as_a_second_set_of_coordinates() {
     assert!((low - vec3(-1.0, 0.0, -1.0)).length() < 1e-5);
 }
 
+/// A two-sided floor under an overcast sky: the light of its back is what the ground below the horizon sends up.
+#[test]
+fn a_back_with_texels_is_a_primitive_that_faces_the_other_way() {
+    if !device() {
+        return;
+    }
+    let lab = Lab::new();
+    let text = fs::read_to_string(lab.at("floor.gltf")).unwrap();
+    fs::write(lab.at("floor.gltf"), text.replace("\"materials\":[{", "\"materials\":[{\"doubleSided\":true,")).unwrap();
+    let small = ["-D", "bake.samples=256", "-D", "bake.density=4", "-D", "bake.interval=120", "-D", "bake.probes=0"];
+    let (scene, bake) = (lab.at("floor.gltf"), lab.at("floor.day"));
+    daylight(&[&["bake", &scene, "-o", &bake][..], &small].concat())
+        .expect(0, &["64 of 128 texels are on the backs of two-sided surfaces", "bake.backs=false"]);
+    assert!(daylight(&["info", &bake]).expect(0, &[]).stdout.contains("128 texels on surfaces, 64 of them on backs"));
+    lab.export("floor.day", "out", &["--overcast", "1", "--time", "12:00"]).expect(0, &["TEXCOORD_1"]);
+    let folder = Path::new(&lab.at("out")).to_owned();
+    let scene = load(folder.join("scene.glb"), &LoadOptions::default()).unwrap_or_else(|error| panic!("{error}"));
+    assert!(scene.materials.iter().all(|material| !material.double_sided));
+    let [front, back] = &scene.meshes[0].primitives[..] else {
+        panic!("{} primitives", scene.meshes[0].primitives.len())
+    };
+    let layers = pixels(folder.join("lightmap-1200.exr"));
+    let (light, width) = (layers.main().unwrap().rgb_pixels().unwrap(), layers.width as f32);
+    let [above, below] = [(front, Vec3::Y), (back, Vec3::NEG_Y)].map(|(primitive, up)| {
+        for triangle in primitive.indices.chunks_exact(3) {
+            let [a, b, c] = [0, 1, 2].map(|corner| primitive.positions[triangle[corner] as usize]);
+            assert!((b - a).cross(c - a).normalize().distance(up) < 1e-5);
+        }
+        assert!(primitive.normals.iter().all(|normal| normal.distance(up) < 1e-5));
+        // The mean of the four texels in the middle.
+        let place = primitive.uvs[1].iter().sum::<Vec2>() / primitive.uvs[1].len() as f32;
+        let [x, y] = [place.x * width, place.y * layers.height as f32].map(|at| at.round() as usize);
+        let at = |(x, y): (usize, usize)| light[y * layers.width as usize + x][1];
+        [(x - 1, y - 1), (x, y - 1), (x - 1, y), (x, y)].map(at).iter().sum::<f32>() / 4.0
+    });
+    let albedo = Weather::default().ground_albedo() as f32;
+    // The tolerance of 2 % is for the mean of both sides, which are in one tile.
+    assert!(above > 0.0 && (below / above / albedo - 1.0).abs() < 0.06, "{below} of {above}");
+}
+
 /// A real bake, rebuilt from the pages, the coefficients and the light from outside by the page's own words.
 #[test]
 fn the_pages_and_the_table_rebuild_the_lightmaps() {
@@ -421,6 +461,11 @@ fn what_cannot_be_exported_is_refused_and_named() {
     let whole = fs::read(&bake).unwrap();
     fs::write(lab.at("cut.day"), &whole[..whole.len() - 40]).unwrap();
     lab.export("cut.day", "out", &[]).expect(3, &["cut.day", "cut off"]);
+    // Files of another version, and of another kind.
+    let older = [&whole[..8], &[1], &whole[9..]].concat();
+    fs::write(lab.at("older.day"), older).unwrap();
+    lab.export("older.day", "out", &[]).expect(3, &["older.day", "has version 1; version 2 can be read"]);
+    lab.export("floor.gltf", "out", &[]).expect(3, &["floor.gltf", "is not a file of baked daylight", "daylight bake"]);
     // Folders.
     lab.export("even.day", "floor.gltf/out", &[]).expect(1, &["floor.gltf/out"]);
     lab.export("even.day", "floor.gltf", &[]).expect(1, &["floor.gltf"]);

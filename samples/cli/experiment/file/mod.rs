@@ -55,6 +55,7 @@ use crate::{
 /// The built-in experiments: name and text.
 pub const BUILTIN: &[(&str, &str)] = &[
     ("daylight", include_str!("../../../experiments/daylight.toml")),
+    ("daylight-foreign", include_str!("../../../experiments/daylight-foreign.toml")),
     ("daylight-kinds", include_str!("../../../experiments/daylight-kinds.toml")),
     ("fiv", include_str!("../../../experiments/fiv.toml")),
     ("igi", include_str!("../../../experiments/igi.toml")),

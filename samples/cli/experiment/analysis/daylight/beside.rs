@@ -16,11 +16,13 @@ use crate::{
 };
 
 /// Techniques of pictures and their names in tables.
-const DAYS: [(&str, &str); 7] = [
+const DAYS: [(&str, &str); 9] = [
     ("day", "the day of the experiment"),
     ("cube", "the same day, from a cube"),
     ("lightmap", "the same day, from a lightmap"),
     ("coarse lightmap", "the same day, from a coarse lightmap"),
+    ("lightmap without backs", "the same day, from a lightmap without texels on backs"),
+    ("probes", "the same day with a pot that probes light"),
     ("diffuse", "the same day, diffuse surfaces on both sides"),
     ("overcast", "the same day, overcast"),
     ("winter", "a winter day"),
@@ -58,7 +60,8 @@ pub(super) fn pairs<'a>(results: &'a Results, view: (&'a str, &'a str), name: &s
 
 /// Name of the reference of a technique.
 fn reference_of(name: &str) -> String {
-    let day = if matches!(name, "cube" | "lightmap" | "coarse lightmap") { "day" } else { name };
+    let is_same_light = matches!(name, "cube" | "lightmap" | "coarse lightmap" | "lightmap without backs");
+    let day = if is_same_light { "day" } else { name };
     format!("{day}, truth")
 }
 
