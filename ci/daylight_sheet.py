@@ -39,6 +39,8 @@ def exposed(rows, factor):
 def sheet(lucerna, rows, runs, layer, output, work):
     """One column for each time, one row for each method. The exposure is that of the path tracer's picture of all light."""
     times = sorted({time for method, time in runs if method == rows[-1]})
+    if not times:
+        return
     methods = [row for row in rows if (row, times[0]) in runs]
     columns = []
     for time in times:

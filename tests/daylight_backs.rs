@@ -1,14 +1,14 @@
 //! Lightmaps of two-sided surfaces: each side has its own light.
 
 use crate::{
-    daylight_lightmap::{baking, lightmap_lit_by, range, seen},
+    daylight_lightmap::{baking, lightmap_lit_by, planned, range, seen},
     tracer_lab::{Stage, view},
 };
-use glam::{Mat4, Vec3, vec3};
+use glam::{Mat4, Quat, Vec3, vec3};
 use lucerna::{
     gpu::testing::with_gpu,
-    scene::{Material, Transform, View},
-    techniques::daylight::{Backs, Baked, Baking, Group, lightmap},
+    scene::{Material, Node, Transform, View},
+    techniques::daylight::{Backs, Baked, Baking, Group, Sources, Transport, lightmap},
 };
 
 /// A box of two metres that glows in its upper and in its lower half, parted by a grey sheet with two sides; its front is up.
@@ -19,7 +19,7 @@ struct Parted {
 }
 
 impl Parted {
-    /// `turned`: the node of the sheet mirrors it.
+    /// `mirrored`: the node of the sheet mirrors it.
     fn new(radiances: [f32; 2], mirrored: bool) -> Self {
         let mut stage = Stage::new();
         let lamps = radiances.map(|radiance| stage.emitter(Vec3::splat(radiance)));
@@ -74,16 +74,23 @@ fn a_back_that_no_light_reaches_is_black_and_has_no_texels() {
     with_gpu(|gpu| {
         let mut parted = Parted::new([1.0, 0.0], false);
         let alone = parted.bake(gpu, baking(64));
-        assert!(alone.stored.corners.backs.is_empty(), "no back is lit");
-        // A smaller sheet, lit from both sides.
-        let small = parted.stage.quad(parted.grey, vec3(0.8, 0.3, -0.9), Vec3::Z * 0.1, Vec3::X * 0.1);
+        assert_eq!(alone.stored.corners.backs, Some(Vec::new()), "no back is lit");
+        let without = parted.stage.scene.clone();
+        // The same sheet, smaller and lit from both sides.
+        let nodes = &mut parted.stage.scene.nodes;
+        let small = nodes.len();
+        let place = Mat4::from_scale_rotation_translation(Vec3::splat(0.1), Quat::IDENTITY, vec3(0.7, 0.3, -0.7));
+        nodes.push(Node { local: Transform::Matrix(place), ..nodes[small - 1].clone() });
         let baked = parted.bake(gpu, baking(64));
         let first = lightmap::triangles(&parted.stage.scene)[..small].iter().sum::<u32>();
-        let backs: Vec<u32> = baked.stored.corners.backs.iter().map(|(triangle, _)| *triangle).collect();
+        let backs: Vec<u32> = baked.stored.corners.backs.iter().flatten().map(|(triangle, _)| *triangle).collect();
         assert_eq!(backs, [first, first + 1]);
-        let [above, below] = Parted::cameras()
-            .map(|camera| range(seen(gpu, &parted.stage.scene, camera, &baked).into_iter().map(|(_, e)| e)));
-        assert!(above[0] > 2.0 && below == [0.0, 0.0], "{above:?} {below:?}");
+        let without = Parted { stage: Stage { scene: without }, lamps: parted.lamps, grey: parted.grey };
+        for (parted, baked) in [(&without, &alone), (&parted, &baked)] {
+            let [above, below] = Parted::cameras()
+                .map(|camera| range(seen(gpu, &parted.stage.scene, camera, baked).into_iter().map(|(_, e)| e)));
+            assert!(above[0] > 2.0 && below == [0.0, 0.0], "{above:?} {below:?}");
+        }
     });
 }
 
@@ -96,8 +103,8 @@ fn the_inside_of_a_closed_solid_needs_no_texels() {
         let grey = stage.material(Material { double_sided: true, ..Material::diffuse("grey", Vec3::splat(0.5)) });
         stage.sphere(grey, vec3(1.0, 0.0, 0.0), 0.5, 8, false);
         let lamps = [Group { name: "lamps".into(), lights: Vec::new(), materials: vec![lamp] }];
-        let lit = |stage: &Stage| Backs::lit(gpu, &stage.scene, &lamps, &baking(64)).unwrap().lit;
-        assert!(lit(&stage).is_empty());
+        let lit = |stage: &Stage| Backs::lit(gpu, &stage.scene, &lamps, &baking(64)).unwrap().lit.unwrap();
+        assert!(!lit(&stage).contains(&true));
         // A sheet beside it, and a sphere without its last triangle.
         let sheet = stage.quad(grey, Vec3::NEG_X, Vec3::X * 0.5, Vec3::Y * 0.5);
         stage.sphere(grey, vec3(1.0, 1.5, 0.0), 0.5, 8, false);
@@ -112,6 +119,49 @@ fn the_inside_of_a_closed_solid_needs_no_texels() {
             first += count;
         }
         let off = Backs::lit(gpu, &stage.scene, &lamps, &Baking { backs: false, ..baking(64) }).unwrap();
-        assert!(off.lit.is_empty());
+        assert_eq!(off.lit, None);
+    });
+}
+
+#[test]
+fn a_back_that_little_light_reaches_has_texels() {
+    with_gpu(|gpu| {
+        // A black box of 2 m around a sheet; a hole of 8 cm in its floor, 1 m below the back of the sheet, is the only way to the light.
+        let mut stage = Stage::new();
+        let lamp = stage.emitter(Vec3::ONE);
+        stage.cuboid(lamp, Vec3::splat(-4.0), Vec3::splat(4.0), true);
+        let black = stage.material(Material { double_sided: false, ..Material::diffuse("black", Vec3::ZERO) });
+        stage.cuboid(black, vec3(-1.0, -1.0, -1.0), Vec3::ONE, true);
+        let floor = stage.scene.nodes.len() - 4;
+        stage.scene.nodes.remove(floor);
+        for (corner, size) in [
+            (vec3(-1.0, -1.0, -1.0), vec3(2.0, 0.0, 0.96)),
+            (vec3(-1.0, -1.0, 0.04), vec3(2.0, 0.0, 0.96)),
+            (vec3(-1.0, -1.0, -0.04), vec3(0.96, 0.0, 0.08)),
+            (vec3(0.04, -1.0, -0.04), vec3(0.96, 0.0, 0.08)),
+        ] {
+            stage.quad(black, corner, Vec3::Z * size.z, Vec3::X * size.x);
+        }
+        let grey = stage.material(Material { double_sided: true, ..Material::diffuse("grey", Vec3::splat(0.5)) });
+        stage.quad(grey, vec3(-0.2, 0.0, -0.2), Vec3::Z * 0.4, Vec3::X * 0.4);
+        let lamps = [Group { name: "lamps".into(), lights: Vec::new(), materials: vec![lamp] }];
+        let lit = Backs::lit(gpu, &stage.scene, &lamps, &baking(64)).unwrap().lit.unwrap();
+        assert_eq!(lit.iter().filter(|lit| **lit).count(), 2, "of {}", lit.len());
+    });
+}
+
+#[test]
+fn the_transport_of_the_search_gathers_the_light_of_a_new_one() {
+    with_gpu(|gpu| {
+        let Parted { stage: Stage { scene }, lamps, .. } = Parted::new([1.0, 0.5], false);
+        let (plan, unwrapped) = planned(gpu, &scene, &lamps, baking(16));
+        let sources = || Sources::Lightmap(Box::new(unwrapped.by_tile(plan.side())));
+        let searched = Backs::lit(gpu, &scene, &plan.lamps, &plan.settings).unwrap();
+        let mut searched = searched.transport(gpu, &scene, &plan, sources()).unwrap();
+        let mut new = Transport::new(gpu, &scene, &plan, sources()).unwrap();
+        assert!(!plan.times.is_empty() && plan.tile_count() > 0);
+        for tile in 0..plan.tile_count() {
+            assert_eq!(searched.tile(&plan, tile).unwrap(), new.tile(&plan, tile).unwrap());
+        }
     });
 }

@@ -24,10 +24,10 @@ pub fn baking(samples: u32) -> Baking {
 }
 
 /// The plan of a lightmap with one group of lamps: the materials that glow.
-fn planned(gpu: &Gpu, scene: &Scene, glowing: &[u32], settings: Baking) -> (Plan, Unwrapped) {
+pub fn planned(gpu: &Gpu, scene: &Scene, glowing: &[u32], settings: Baking) -> (Plan, Unwrapped) {
     let lamps = vec![Group { name: "lamps".into(), lights: Vec::new(), materials: glowing.to_vec() }];
     let backs = Backs::lit(gpu, scene, &lamps, &settings).unwrap().lit;
-    let unwrapped = lightmap::unwrap(scene, &settings, &backs).unwrap();
+    let unwrapped = lightmap::unwrap(scene, &settings, backs.as_deref()).unwrap();
     let (covered, backs) = (unwrapped.receivers.len() as u64, unwrapped.on_backs());
     let corners = digest(&unwrapped.lightmap.corners);
     let plan = Plan {

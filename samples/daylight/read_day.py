@@ -60,8 +60,8 @@ def read(path):
     if raw[:8] != b"lucday\r\n":
         sys.exit(f"{path}: is not a file of baked daylight")
     version, length = struct.unpack_from("<2I", raw, 8)
-    if version != 2:
-        sys.exit(f"{path}: has version {version}, and this program reads version 2")
+    if version != 3:
+        sys.exit(f"{path}: has version {version}, and this program reads version 3")
     header = json.loads(raw[16 : 16 + length])
     if header["plan"]["settings"]["format"] != "plain":
         sys.exit(f"{path}: has images in blocks, which this program does not read")

@@ -4,7 +4,6 @@
 #extension GL_GOOGLE_include_directive : require
 #include "lib/view.glsl"
 #include "lib/pixel_depth.glsl"
-#include "lib/scene.glsl"
 
 layout(binding = 0, scalar) uniform ViewBlock { View view; };
 layout(binding = 6) uniform sampler2D depth;

@@ -17,8 +17,11 @@ layout(binding = 3, scalar) readonly buffer Positions { vec3 positions[]; };
 layout(binding = 4, scalar) readonly buffer Corners { uint corners[]; };    // in sixteenths of a texel, two of 16 bits
 layout(binding = 5, scalar) readonly buffer Placed { DayPlaced placed[]; }; // instances
 
+// Two numbers of a place that is none.
+const uint NOWHERE = 0xffffffffu;
+
 layout(push_constant, scalar) uniform Push {
-    uint backs;  // number of the first corner of a back; 0: backs have the texels of their fronts
+    uint backs;  // number of the first corner of a back; 0: backs have the texels of their fronts; NOWHERE: backs have none
 };
 
 layout(location = 0) out vec3 seen;  // position in view space, metres
@@ -27,9 +30,6 @@ layout(location = 2) out vec2 back;
 layout(location = 3) flat out uint flipped;
 layout(location = 4) flat out uint sides;
 layout(location = 5) flat out uint has_back; // 0: the back has no texels
-
-// Two numbers of a place that is none.
-const uint NOWHERE = 0xffffffffu;
 
 vec2 place(uint at) {
     return vec2(at & 0xffffu, at >> 16u) / 16.0;
@@ -42,7 +42,7 @@ void main() {
     vec4 world = instances[i].world_from_object * vec4(positions[instances[i].first_vertex + vertex], 1.0);
     gl_Position = view.clip_from_world * world;
     seen = (view.view_from_world * world).xyz;
-    uint of_back = corners[corner + backs];
+    uint of_back = backs == NOWHERE ? NOWHERE : corners[corner + backs];
     front = place(corners[corner]);
     back = place(of_back);
     flipped = instances[i].flags & INSTANCE_FLIPPED;

@@ -79,7 +79,7 @@ impl Lab {
     fn even(&self, name: &str, irradiance: f32) -> Stored {
         let scene = self.scene();
         let settings = Baking { density: 4.0, tile: 8, ..Baking::default() };
-        let unwrapped = lightmap::unwrap(&scene, &settings, &[]).unwrap();
+        let unwrapped = lightmap::unwrap(&scene, &settings, None).unwrap();
         let sun = vec3(0.0, 0.8, 0.6);
         let plan = Plan {
             scene: scene.name.clone(),
@@ -284,6 +284,12 @@ fn a_back_with_texels_is_a_primitive_that_faces_the_other_way() {
     let (scene, bake) = (lab.at("floor.gltf"), lab.at("floor.day"));
     daylight(&[&["bake", &scene, "-o", &bake][..], &small].concat())
         .expect(0, &["64 of 128 texels are on the backs of two-sided surfaces", "bake.backs=false"]);
+    // Each shard searches for the backs by itself.
+    let shards = lab.at("shards.day");
+    for shard in [&["--shard", "2/2"][..], &["--shard", "1/2"], &[]] {
+        daylight(&[&["bake", &scene, "-q", "-o", &shards][..], &small, shard].concat()).expect(0, &[]);
+    }
+    assert!(fs::read(&shards).unwrap() == fs::read(&bake).unwrap());
     assert!(daylight(&["info", &bake]).expect(0, &[]).stdout.contains("128 texels on surfaces, 64 of them on backs"));
     lab.export("floor.day", "out", &["--overcast", "1", "--time", "12:00"]).expect(0, &["TEXCOORD_1"]);
     let folder = Path::new(&lab.at("out")).to_owned();
@@ -464,7 +470,7 @@ fn what_cannot_be_exported_is_refused_and_named() {
     // Files of another version, and of another kind.
     let older = [&whole[..8], &[1], &whole[9..]].concat();
     fs::write(lab.at("older.day"), older).unwrap();
-    lab.export("older.day", "out", &[]).expect(3, &["older.day", "has version 1; version 2 can be read"]);
+    lab.export("older.day", "out", &[]).expect(3, &["older.day", "has version 1; version 3 can be read"]);
     lab.export("floor.gltf", "out", &[]).expect(3, &["floor.gltf", "is not a file of baked daylight", "daylight bake"]);
     // Folders.
     lab.export("even.day", "floor.gltf/out", &[]).expect(1, &["floor.gltf/out"]);

@@ -27,7 +27,7 @@ pub(super) struct Shut {
 impl Shut {
     /// Whether the place is buried. Solids whose surfaces have two sides cannot be told from sheets, as curtains are; a place that sees only backs of
     /// such surfaces is buried if it is `dark` at all times.
-    fn is_buried(self, samples: u32, dark: bool) -> bool {
+    pub(super) fn is_buried(self, samples: u32, dark: bool) -> bool {
         let paths = if dark { self.perhaps } else { self.surely };
         samples >= LEAST && 16 * u64::from(paths) >= SIXTEENTHS * u64::from(samples)
     }

@@ -3,7 +3,7 @@
 //! | bytes | content |
 //! |---|---|
 //! | 8 | `lucday\r\n` |
-//! | 4 | version, 2 |
+//! | 4 | version, 3 |
 //! | 4 | bytes of the header |
 //! | … | header: JSON, the [`Plan`] and the bytes of each tile |
 //! | … | the tiles, one after the other ([`Tile::encode`]) |
@@ -34,7 +34,7 @@ use crate::{
 };
 
 const FILE: Container =
-    Container { magic: *b"lucday\r\n", version: 2, name: "a file of baked daylight", command: "daylight bake" };
+    Container { magic: *b"lucday\r\n", version: 3, name: "a file of baked daylight", command: "daylight bake" };
 /// Largest size of a file that is read, bytes.
 const MOST_BYTES: u64 = 8 << 30;
 
@@ -61,9 +61,9 @@ struct Header {
     probes: Vec<u64>,
     /// Number of triangles with corners.
     triangles: u64,
-    /// Number of triangles whose backs have corners.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    backs: u64,
+    /// Number of triangles whose backs have corners; `None`: backs show the light of the fronts.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    backs: Option<u64>,
 }
 
 /// What a bake holds and what it is within.
@@ -139,7 +139,7 @@ impl Stored {
             tiles: lengths(&tiles),
             probes: lengths(&probes),
             triangles: self.corners.fronts.len() as u64,
-            backs: self.corners.backs.len() as u64,
+            backs: self.corners.backs.as_ref().map(|backs| backs.len() as u64),
         };
         let mut body: Vec<u8> = [tiles, probes].concat().concat();
         body.extend(self.corners.encode());
@@ -185,7 +185,7 @@ impl Stored {
             let mut lengths = header.tiles.iter().chain(&header.probes);
             Ok(lengths.try_fold(of_corners, |sum, length| sum.checked_add(*length)))
         })?;
-        let Header { plan, tiles: lengths, probes: brick_lengths, triangles, .. } = header;
+        let Header { plan, tiles: lengths, probes: brick_lengths, triangles, backs } = header;
         let mut tiles = Vec::new();
         for (index, length) in lengths.iter().enumerate() {
             let (tile, after) = rest.split_at(*length as usize);
@@ -201,7 +201,7 @@ impl Stored {
             probes.push(decoded.map_err(|error| error.at(format!("probes[{index}]")))?);
             rest = after;
         }
-        let corners = Corners::decode(rest, triangles).map_err(damaged)?;
+        let corners = Corners::decode(rest, triangles, backs).map_err(damaged)?;
         plan.check_corners(&corners).map_err(|error| damaged(error.to_string()))?;
         Ok(Self { plan, tiles, probes, corners })
     }
@@ -293,11 +293,6 @@ fn dark(steps: &[[f64; 2]]) -> f64 {
 
 fn relative(light: f64, square: f64, lines: f64) -> f64 {
     if light > 0.0 { (square / lines).sqrt() / (light / lines) } else { 0.0 }
-}
-
-/// Whether there are none.
-fn is_zero(count: &u64) -> bool {
-    *count == 0
 }
 
 /// Number of probes of a brick.

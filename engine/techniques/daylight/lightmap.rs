@@ -2,9 +2,11 @@
 
 use glam::Vec2;
 
+pub use super::corners::{Corners, position};
 use super::{
     Baking,
     atlas::{self, Atlas, Instance, MeshInput, Texel, texels, touched_by},
+    corners::{NOWHERE, sixteenths},
 };
 use crate::{
     Error, Result,
@@ -12,8 +14,6 @@ use crate::{
     shaders::types,
 };
 
-/// Parts of a texel in which corners are stored.
-const PARTS: f32 = 16.0;
 /// Side of the blocks of texels whose triangles are listed.
 const BLOCK: u32 = 16;
 /// Largest side of a lightmap: positions of corners have 16 bits.
@@ -25,86 +25,6 @@ pub struct Lightmap {
     /// Texels.
     pub extent: [u32; 2],
     pub corners: Corners,
-}
-
-/// Where the triangles of a scene are in a lightmap: their corners in sixteenths of a texel.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Corners {
-    /// All triangles of instance 0, then of instance 1, and so on.
-    pub fronts: Vec<[u16; 6]>,
-    /// The numbers of the triangles whose backs have texels of their own, ascending, and the corners of their backs. The back of any other
-    /// two-sided triangle takes the light of its front if there is no entry at all, and else no light.
-    pub backs: Vec<(u32, [u16; 6])>,
-}
-
-/// The place of a back that has none.
-const NOWHERE: [u16; 6] = [u16::MAX; 6];
-
-impl Corners {
-    pub fn is_empty(&self) -> bool {
-        self.fronts.is_empty()
-    }
-
-    /// The corners of all fronts, and then of all backs if there are any, as the device reads them (`daylight/place.vert`).
-    pub(super) fn listed(&self) -> Vec<[u16; 6]> {
-        let mut all = self.fronts.clone();
-        if !self.backs.is_empty() {
-            all.resize(2 * self.fronts.len(), NOWHERE);
-            for (triangle, corners) in &self.backs {
-                all[self.fronts.len() + *triangle as usize] = *corners;
-            }
-        }
-        all
-    }
-
-    /// The bytes in a file: six numbers of 16 bits for each front, and for each back the number of its triangle, 32 bits, before such numbers.
-    pub(super) fn encode(&self) -> Vec<u8> {
-        let mut out = Vec::with_capacity(Self::bytes(self.fronts.len() as u64, self.backs.len() as u64) as usize);
-        self.fronts.iter().flatten().for_each(|number| out.extend(number.to_le_bytes()));
-        for (triangle, corners) in &self.backs {
-            out.extend(triangle.to_le_bytes());
-            corners.iter().for_each(|number| out.extend(number.to_le_bytes()));
-        }
-        out
-    }
-
-    /// The number of those bytes.
-    pub(super) fn bytes(fronts: u64, backs: u64) -> u64 {
-        fronts.saturating_mul(12).saturating_add(backs.saturating_mul(16))
-    }
-
-    /// Reads those bytes. `fronts`: their number.
-    ///
-    /// # Errors
-    /// A sentence that names the first number that is impossible.
-    pub(super) fn decode(bytes: &[u8], fronts: u64) -> Result<Self, String> {
-        let numbers = |bytes: &[u8]| std::array::from_fn(|i| u16::from_le_bytes([bytes[2 * i], bytes[2 * i + 1]]));
-        let (of_fronts, of_backs) = bytes.split_at((12 * fronts as usize).min(bytes.len()));
-        let back = |bytes: &[u8; 16]| {
-            let [a, b, c, d, ..] = *bytes;
-            (u32::from_le_bytes([a, b, c, d]), numbers(&bytes[4..]))
-        };
-        let out = Self {
-            fronts: of_fronts.chunks_exact(12).map(numbers).collect(),
-            backs: of_backs.as_chunks().0.iter().map(back).collect(),
-        };
-        out.check().map(|()| out)
-    }
-
-    /// Checks the numbers of triangles.
-    ///
-    /// # Errors
-    /// A sentence that names the first one that is impossible.
-    fn check(&self) -> Result<(), String> {
-        let count = self.fronts.len() as u32;
-        if let Some((triangle, _)) = self.backs.iter().find(|(triangle, _)| *triangle >= count) {
-            return Err(format!("has a place for the back of triangle {triangle}, of {count}"));
-        }
-        match self.backs.windows(2).find(|pair| pair[0].0 >= pair[1].0) {
-            Some(pair) => Err(format!("has the back of triangle {} after that of {}", pair[1].0, pair[0].0)),
-            None => Ok(()),
-        }
-    }
 }
 
 /// A lightmap, with what only a bake needs.
@@ -158,11 +78,13 @@ pub fn triangles(scene: &Scene) -> Vec<u32> {
     placed(scene).map(|(_, _, _, primitive)| primitive.indices.len() as u32 / 3).collect()
 }
 
-/// Unwraps a scene at rest. `backs`: for each triangle whether its back gets texels of its own ([`Backs::lit`](super::Backs)); empty: no back does.
+/// Unwraps a scene at rest. `backs`: for each triangle whether its back gets texels of its own ([`Backs::lit`](super::Backs)); `None`: backs show the
+/// light of the fronts.
 ///
 /// # Errors
-/// `Input` if the scene has no triangles or positions that are not finite; `Usage` if the lightmap would be too large.
-pub fn unwrap(scene: &Scene, settings: &Baking, backs: &[bool]) -> Result<Unwrapped> {
+/// `Input` if the scene has no triangles or positions that are not finite, if the lightmap would be too large, or if `backs` has another number of
+/// triangles than the scene.
+pub fn unwrap(scene: &Scene, settings: &Baking, backs: Option<&[bool]>) -> Result<Unwrapped> {
     let pose = Pose::rest(scene);
     let mut shapes: Vec<(usize, usize)> = Vec::new();
     let mut lists: Vec<Vec<[u32; 3]>> = Vec::new();
@@ -181,8 +103,13 @@ pub fn unwrap(scene: &Scene, settings: &Baking, backs: &[bool]) -> Result<Unwrap
         firsts.push(firsts.last().copied().unwrap_or(0) + lists[mesh].len() as u32);
     }
     let count = firsts.last().copied().unwrap_or(0) as usize;
-    debug_assert!(backs.is_empty() || backs.len() == count);
-    if backs.contains(&true) {
+    let searched = backs.is_some();
+    let backs = backs.unwrap_or_default();
+    if searched && backs.len() != count {
+        return Err(Error::input(format!("has {count} triangles, and the backs of {} were searched", backs.len())));
+    }
+    let has_backs = backs.contains(&true);
+    if has_backs {
         let of_backs: Vec<_> = instances
             .iter()
             .zip(firsts.windows(2))
@@ -204,12 +131,18 @@ pub fn unwrap(scene: &Scene, settings: &Baking, backs: &[bool]) -> Result<Unwrap
         max_size: settings.lightmap.min(MOST_SIDE),
         ..atlas::Settings::default()
     };
-    let built = atlas::build(&meshes, &instances, &wishes).map_err(Error::input)?;
+    let built = atlas::build(&meshes, &instances, &wishes).map_err(|what| {
+        let error = Error::input(what);
+        match has_backs {
+            true => error.help("Or leave the backs of two-sided surfaces out: bake.backs=false"),
+            false => error,
+        }
+    })?;
     let mut fronts: Vec<[u16; 6]> = built.corners.iter().map(|corners| sixteenths(*corners)).collect();
     // Texels are those of the corners as they are stored.
     let rounded = Atlas { corners: fronts.iter().map(|c| position(*c)).collect(), ..built };
     let of_backs = fronts.split_off(count.min(fronts.len()));
-    let backs = (0..).zip(of_backs).filter(|(_, corners)| *corners != NOWHERE).collect();
+    let backs = searched.then(|| (0..).zip(of_backs).filter(|(_, corners)| *corners != NOWHERE).collect());
     let receivers =
         texels(&rounded).into_iter().map(|texel| (texel, hit_of(&firsts, texel.triangle, texel.barycentric))).collect();
     Ok(Unwrapped {
@@ -219,23 +152,6 @@ pub fn unwrap(scene: &Scene, settings: &Baking, backs: &[bool]) -> Result<Unwrap
         firsts,
         notes: rounded.notes,
     })
-}
-
-/// Corners as they are stored.
-fn sixteenths([a, b, c]: [Vec2; 3]) -> [u16; 6] {
-    if !a.is_finite() {
-        return NOWHERE;
-    }
-    [a.x, a.y, b.x, b.y, c.x, c.y].map(|value| (value * PARTS).round().clamp(0.0, 65535.0) as u16)
-}
-
-/// Corners in texels; infinite for a back without texels.
-pub fn position(corners: [u16; 6]) -> [Vec2; 3] {
-    if corners == NOWHERE {
-        return [Vec2::INFINITY; 3];
-    }
-    let at = |i: usize| Vec2::new(f32::from(corners[2 * i]), f32::from(corners[2 * i + 1])) / PARTS;
-    [at(0), at(1), at(2)]
 }
 
 /// The surface point of a triangle of a lightmap, whose `triangle` is among all fronts and then all backs. `firsts`: the number of the first triangle
@@ -290,38 +206,5 @@ impl TileTexels {
         let triangles = self.triangles.get(block as usize).map_or(&[][..], Vec::as_slice);
         let found = atlas::spread(&self.corners, triangles, at).into_iter();
         found.map(|(triangle, barycentrics)| hit_of(&self.firsts, triangle, barycentrics)).collect()
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn corners_come_back_and_impossible_triangles_are_named() {
-        let place = |at: u16| [at, 0, at + 16, 0, at, 16];
-        let corners =
-            Corners { fronts: vec![place(16), place(48), place(80)], backs: vec![(0, place(112)), (2, place(144))] };
-        let bytes = corners.encode();
-        assert_eq!(bytes.len() as u64, Corners::bytes(3, 2));
-        assert_eq!(Corners::decode(&bytes, 3).as_ref(), Ok(&corners));
-        assert_eq!(corners.listed()[3..], [place(112), NOWHERE, place(144)]);
-        assert_eq!(Corners { backs: Vec::new(), ..corners.clone() }.listed().len(), 3);
-        assert_eq!(Corners::decode(&[], 0), Ok(Corners::default()));
-        let with = |backs| Corners { backs, ..corners.clone() }.encode();
-        let error = Corners::decode(&with(vec![(3, place(112))]), 3).unwrap_err();
-        assert!(error.contains("back of triangle 3, of 3"), "{error}");
-        for wrong in [[2, 0], [1, 1]] {
-            let error = Corners::decode(&with(wrong.map(|triangle| (triangle, place(112))).to_vec()), 3).unwrap_err();
-            assert!(error.contains(&format!("triangle {} after that of {}", wrong[1], wrong[0])), "{error}");
-        }
-    }
-
-    #[test]
-    fn places_are_stored_in_sixteenths_of_a_texel() {
-        let corners = [Vec2::new(4.0, 8.5), Vec2::new(4091.0, 8.5), Vec2::new(4.0, 9.0625)];
-        assert_eq!(position(sixteenths(corners)), corners);
-        assert_eq!(sixteenths([Vec2::INFINITY; 3]), NOWHERE);
-        assert!(!position(NOWHERE)[0].is_finite());
     }
 }

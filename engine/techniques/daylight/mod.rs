@@ -17,6 +17,7 @@ mod buried;
 mod civil;
 pub mod columns;
 mod compress;
+mod corners;
 pub mod course;
 pub mod cube;
 pub mod day;

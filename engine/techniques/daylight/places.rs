@@ -15,7 +15,7 @@ use crate::{
 #[derive(Debug)]
 pub(super) struct Places {
     corners: OwnedBuffer,
-    /// Corners of all fronts, which those of the backs follow; 0: there are none.
+    /// Corners of all fronts, which those of the backs follow; 0: backs show the light of the fronts; `u32::MAX`: backs have no light.
     backs: u32,
     placed: OwnedBuffer,
     draws: Vec<DrawCall>,
@@ -52,7 +52,11 @@ impl Places {
         draws.retain(|draw| draw.vertices > 0);
         Ok(Some(Self {
             corners: OwnedBuffer::with_contents(gpu, "daylight.corners", bytemuck::cast_slice(&corners.listed()))?,
-            backs: if corners.backs.is_empty() { 0 } else { first },
+            backs: match &corners.backs {
+                None => 0,
+                Some(backs) if backs.is_empty() => u32::MAX,
+                Some(_) => first,
+            },
             placed: OwnedBuffer::with_contents(gpu, "daylight.placed", bytemuck::cast_slice(&placed))?,
             draws,
         }))

@@ -45,7 +45,6 @@ pub enum Kind {
         /// Texels on surfaces, those included that are left out because they are inside of solids.
         covered: u64,
         /// Those on backs of two-sided surfaces.
-        #[serde(default)]
         backs: u64,
         /// Digest of the corners of all triangles.
         corners: Digest,

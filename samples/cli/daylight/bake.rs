@@ -6,7 +6,7 @@ use lucerna::{
     Result,
     gpu::Gpu,
     image,
-    techniques::daylight::{Baking, Cells, Kind, Sources, Stored, units},
+    techniques::daylight::{Backs, Baking, Cells, Kind, Sources, Stored, units},
 };
 use serde::{Deserialize, Serialize};
 use serde_json::json;
@@ -67,12 +67,19 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
     let interrupt = Interrupt::install();
     let stage = Stage::open(&args.stage)?;
     stage.notes().iter().for_each(|note| console.info(&format!("note: {}: {}", note.place, note.text)));
-    let gpu = Gpu::new(args.run.device.options()?)?;
-    console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
+    let mut gpu = None;
+    let device = || {
+        if Backs::are_wanted(&stage.scene, &keys.bake) {
+            console.info("looking for the backs of two-sided surfaces that light reaches");
+        }
+        Ok(gpu.insert(Gpu::new(args.run.device.options()?)?).clone())
+    };
     let Planned { mut plan, sources, corners, backs, notes } =
-        plan(&gpu, &args.day, args.kind, &keys.bake, &stage, &args.stage)?;
+        plan(device, &args.day, args.kind, &keys.bake, &stage, &args.stage)?;
     notes.iter().for_each(|note| console.info(&format!("note: {note}")));
     plan.validate()?;
+    let gpu = gpu.map_or_else(|| Gpu::new(args.run.device.options()?), Ok)?;
+    console.info(&format!("lucerna {}, {}", program::VERSION, gpu.describe()));
     let texels = match &plan.receivers {
         Kind::View { .. } | Kind::Cube { .. } => u64::from(plan.extent[0]) * u64::from(plan.extent[1]),
         Kind::Lightmap { covered, .. } => *covered,

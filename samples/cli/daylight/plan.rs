@@ -243,7 +243,7 @@ pub struct Planned {
     pub plan: Plan,
     pub sources: Sources,
     pub corners: Corners,
-    /// Those of a lightmap, which has begun what gathers the light ([`Backs::transport`]).
+    /// The lit backs of a lightmap, and the transport that the search has made.
     pub backs: Backs,
     pub notes: Vec<String>,
 }
@@ -287,7 +287,7 @@ impl Receivers {
 
     fn of_lightmap(gpu: &Gpu, scene: &Scene, baking: &Baking, groups: &[Group]) -> Result<Self> {
         let backs = Backs::lit(gpu, scene, groups, baking)?;
-        let unwrapped = lightmap::unwrap(scene, baking, &backs.lit)?;
+        let unwrapped = lightmap::unwrap(scene, baking, backs.lit.as_deref())?;
         let corners = unwrapped.lightmap.corners.clone();
         let (covered, on_backs) = (unwrapped.receivers.len() as u64, unwrapped.on_backs());
         let kind = Kind::Lightmap { charts: unwrapped.charts, covered, backs: on_backs, corners: digest(&corners) };
@@ -309,7 +309,7 @@ impl Receivers {
 /// # Errors
 /// `Usage` for an impossible day or lightmap; `Input` if the scene has no surfaces.
 pub fn plan(
-    gpu: &Gpu,
+    gpu: impl FnOnce() -> Result<Gpu>,
     options: &DayOptions,
     kind: KindArg,
     baking: &Baking,
@@ -325,7 +325,7 @@ pub fn plan(
             let (_, view) = stage.at(args.time, args.size)?;
             Receivers::around(&stage.placed.name, &view, baking)
         }
-        KindArg::Lightmap => Receivers::of_lightmap(gpu, &stage.scene, baking, groups),
+        KindArg::Lightmap => Receivers::of_lightmap(&gpu()?, &stage.scene, baking, groups),
     })
 }
 
@@ -378,7 +378,6 @@ pub(super) fn planned(
         times.extend(lit(&of_day, &calendar, (day, course), baking));
     }
     let lamps = if options.no_lamps { Vec::new() } else { lamps::groups(scene, &options.lamp)? };
-    let Receivers { kind, extent, sources, corners, backs, mut notes } = receivers(&lamps)?;
     let probes = match (baking.probes > 0.0, options.probe_box) {
         (true, given) => {
             let around = given.map(|corners| corners.0).or_else(|| Grid::around(scene, baking.probes));
@@ -390,6 +389,11 @@ pub(super) fn planned(
         }
         (false, None) => None,
     };
+    // Where steps are left out, the number of times is known later.
+    if baking.adaptive == Adaptive::Off {
+        Cells::new(scene, baking, times.len())?;
+    }
+    let Receivers { kind, extent, sources, corners, backs, mut notes } = receivers(&lamps)?;
     if calendar.point.is_some() && baking.disc {
         notes.push("a sun at a distance is a point: bake.disc has no effect".into());
     }
@@ -407,10 +411,6 @@ pub(super) fn planned(
         settings: baking.clone(),
     };
     plan.check_whole()?;
-    // Where steps are left out, the number of times is known later.
-    if plan.settings.adaptive == Adaptive::Off {
-        Cells::new(scene, &plan.settings, plan.times.len())?;
-    }
     Ok(Planned { plan, sources, corners, backs, notes })
 }
 

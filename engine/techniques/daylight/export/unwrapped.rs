@@ -26,8 +26,8 @@ pub struct Unwrapping {
 /// Gives each mesh of a node coordinates in the lightmap. Each node gets a mesh of its own, because instances have different places, and
 /// vertices are split where charts end. No texture of the scene uses the set of coordinates.
 ///
-/// If backs have texels of their own, two-sided materials become one-sided, and the backs that have texels become further primitives that face the
-/// other way. Unlit materials stay as they are.
+/// Where backs have texels of their own, they become further primitives that face the other way, and their materials become one-sided. So backs of
+/// the same materials without light vanish. Materials that let light through stay as they are, because one-sided glass is solid.
 ///
 /// # Errors
 /// `Input` if the bake is no lightmap of this scene, or if textures use all sets of coordinates.
@@ -45,9 +45,7 @@ pub fn unwrapped(scene: &Scene, stored: &Stored) -> Result<Unwrapping> {
     let [width, height] = stored.plan.extent;
     let scale = Vec2::new(1.0 / width as f32, 1.0 / height as f32);
     let mut out = scene.clone();
-    if !backs.is_empty() {
-        out.materials.iter_mut().for_each(|material| material.double_sided &= material.unlit);
-    }
+    let backs = backs.as_deref().unwrap_or_default();
     out.meshes.clear();
     let mut vertices = [0, 0];
     let mut first = 0;
@@ -62,7 +60,11 @@ pub fn unwrapped(scene: &Scene, stored: &Stored) -> Result<Unwrapping> {
             let [from, until] =
                 [first, first + count].map(|end| backs.partition_point(|(triangle, _)| (*triangle as usize) < end));
             let of_backs = backs[from..until].iter().map(|(triangle, place)| (*triangle as usize - first, *place));
-            let split_backs = (from < until).then(|| turned(split(primitive, of_backs, uv_set as usize, scale)));
+            let is_glass = scene.materials[primitive.material as usize].transmission > 0.0;
+            let split_backs = (from < until && !is_glass).then(|| {
+                out.materials[primitive.material as usize].double_sided = false;
+                turned(split(primitive, of_backs, uv_set as usize, scale))
+            });
             first += count;
             vertices[0] += primitive.positions.len();
             for split in [Some(split_fronts), split_backs].into_iter().flatten() {

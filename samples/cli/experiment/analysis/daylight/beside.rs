@@ -22,7 +22,7 @@ const DAYS: [(&str, &str); 9] = [
     ("lightmap", "the same day, from a lightmap"),
     ("coarse lightmap", "the same day, from a coarse lightmap"),
     ("lightmap without backs", "the same day, from a lightmap without texels on backs"),
-    ("probes", "the same day with a pot that probes light"),
+    ("probes", "the same day with a pot, lit by probes"),
     ("diffuse", "the same day, diffuse surfaces on both sides"),
     ("overcast", "the same day, overcast"),
     ("winter", "a winter day"),
