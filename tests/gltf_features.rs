@@ -3,7 +3,8 @@
 use crate::gltf::{File, PNG, bytes};
 use glam::{Mat4, Quat, Vec2, Vec3, Vec4};
 use lucerna::scene::{
-    AlphaMode, Interpolation, Keys, LightKind, MipFilter, NoteKind, Primitive, Projection, Scene, Transform, Wrap,
+    AlphaMode, Interpolation, Keys, LightKind, LoadOptions, MipFilter, NoteKind, Primitive, Projection, Scene,
+    Transform, Wrap, load,
 };
 use serde_json::json;
 
@@ -48,6 +49,18 @@ fn points_and_lines_are_noted() {
             (NoteKind::Ignored, "meshes[0].primitives[0]")
         );
     }
+}
+
+#[test]
+fn a_unit_is_noted_and_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("square.glb");
+    std::fs::write(&path, File::square().glb()).unwrap();
+    let [plain, in_unit] =
+        [None, Some(0.01)].map(|unit| load(&path, &LoadOptions { unit, ..LoadOptions::default() }).unwrap());
+    assert_eq!(corners(only(&plain)), corners(only(&in_unit)));
+    assert!(plain.notes.is_empty(), "{:?}", plain.notes);
+    assert_eq!((in_unit.notes[0].kind, in_unit.notes[0].place.as_str()), (NoteKind::Ignored, "unit"));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! From a file name to a scene.
 
-use super::{Limits, Scene, archive, c_arrays, folder, gltf, obj};
+use super::{Limits, Note, NoteKind, Scene, archive, c_arrays, folder, gltf, obj};
 use crate::{Error, Result};
 use std::{path::Path, rc::Rc};
 
@@ -71,7 +71,14 @@ fn parsed(
     options: &LoadOptions,
 ) -> Result<Scene> {
     let scene = match format {
-        Format::Gltf => gltf::read(path, folder, bytes, &options.limits)?,
+        Format::Gltf => {
+            let mut scene = gltf::read(path, folder, bytes, &options.limits)?;
+            if options.unit.is_some() {
+                let text = "has no effect: glTF files are in metres".into();
+                scene.notes.push(Note { kind: NoteKind::Ignored, place: "unit".into(), text });
+            }
+            scene
+        }
         Format::Obj => obj::read(path, folder, bytes, options.unit.unwrap_or(1.0), &options.limits)?,
         Format::Arrays => {
             c_arrays::read(bytes, options.unit.unwrap_or_else(|| c_arrays::usual_unit(bytes)), &options.limits)?
