@@ -31,23 +31,17 @@ impl Places {
         if corners.is_empty() {
             return Ok(None);
         }
-        let triangles = lightmap::triangles(scene);
-        let all: u64 = triangles.iter().map(|count| u64::from(*count)).sum();
-        if all != corners.fronts.len() as u64 {
-            let what = format!("has places for {} triangles, the scene has {all}", corners.fronts.len());
-            return Err(baked.blamed(Error::input(what)));
-        }
         let (mut placed, mut draws, mut first) = (Vec::new(), Vec::new(), 0);
-        for ((number, count), (.., primitive)) in triangles.into_iter().enumerate().zip(lightmap::placed(scene)) {
+        for (number, (.., primitive)) in lightmap::placed(scene).enumerate() {
             let double_sided = scene.materials.get(primitive.material as usize).is_some_and(|of| of.double_sided);
             placed.push(types::DayPlaced { first, sides: 1 + u32::from(double_sided) });
-            draws.push(DrawCall {
-                first_vertex: first,
-                vertices: 3 * count,
-                first_instance: number as u32,
-                instances: 1,
-            });
-            first += 3 * count;
+            let vertices = primitive.indices.len() as u32 / 3 * 3;
+            draws.push(DrawCall { first_vertex: first, vertices, first_instance: number as u32, instances: 1 });
+            first += vertices;
+        }
+        let (all, stored) = (first / 3, corners.fronts.len());
+        if all as usize != stored {
+            return Err(baked.blamed(Error::input(format!("has places for {stored} triangles, the scene has {all}"))));
         }
         draws.retain(|draw| draw.vertices > 0);
         Ok(Some(Self {
