@@ -174,12 +174,15 @@ pub fn bake(args: &DayBakeArgs, console: Console) -> Result<ExitCode> {
             let lines = info::lines(&summary).into_iter().chain(of_probes.as_ref().map(info::probe_line));
             lines.for_each(|line| console.info(&line));
             // The tolerance is checked before the error is rounded to 32 bits.
-            if summary.worst_tile > 1.0001 * plan.settings.tolerance && plan.settings.images > 0 {
+            if summary.worst_tile > 1.0001 * plan.settings.tolerance {
+                let reason = match plan.settings.images {
+                    0 => "its noise hides the light that more images would hold; more bake.samples show it".to_owned(),
+                    images => format!("bake.images allows only {images} images"),
+                };
                 console.warning(&format!(
-                    "the error of a tile is {:.1} %, {:.1} % were allowed: bake.images allows only {} images",
+                    "the error of a tile is {:.2} %, {:.2} % were allowed: {reason}",
                     100.0 * summary.worst_tile,
-                    100.0 * plan.settings.tolerance,
-                    plan.settings.images
+                    100.0 * plan.settings.tolerance
                 ));
             }
             if summary.hidden > 0.25 {
