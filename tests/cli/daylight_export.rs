@@ -27,10 +27,10 @@ pub fn daylight(arguments: &[&str]) -> Ran {
 }
 
 /// A folder with a floor of 2×2 m, and files of baked light that were made by hand.
-struct Lab(tempfile::TempDir);
+pub struct Lab(tempfile::TempDir);
 
 impl Lab {
-    fn new() -> Self {
+    pub fn new() -> Self {
         let folder = tempfile::tempdir().unwrap();
         let corners: [[f32; 3]; 4] = [[-1.0, 0.0, -1.0], [-1.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, -1.0]];
         let normals = [[0.0f32, 1.0, 0.0]; 4];
@@ -69,14 +69,14 @@ impl Lab {
         self.0.path().join(name).display().to_string()
     }
 
-    fn scene(&self) -> Scene {
+    pub fn scene(&self) -> Scene {
         let mut scene = load(self.at("floor.gltf"), &LoadOptions::default()).unwrap();
         scene.name = "floor".into();
         scene
     }
 
     /// A bake of the floor in which each texel has this irradiance under an overcast sky at noon, and no light of the sun.
-    fn even(&self, name: &str, irradiance: f32) -> Stored {
+    pub fn even(&self, name: &str, irradiance: f32) -> Stored {
         let scene = self.scene();
         let settings = Baking { density: 4.0, tile: 8, ..Baking::default() };
         let unwrapped = lightmap::unwrap(&scene, &settings, None).unwrap();

@@ -4,11 +4,18 @@ use std::{fs, path::Path};
 
 use glam::{Vec2, Vec3};
 use half::f16;
-use lucerna::techniques::daylight::cube;
+use lucerna::{
+    scene::Node,
+    techniques::daylight::{
+        Stored, cube,
+        export::{Unwrapping, unwrapped},
+        lightmap,
+    },
+};
 use serde_json::{Value, json};
 
 use crate::{
-    daylight_export::{Read, daylight, json_of, ktx2, numbers, pixels},
+    daylight_export::{Lab, Read, daylight, json_of, ktx2, numbers, pixels},
     support::{device, files},
 };
 
@@ -309,4 +316,28 @@ fn a_cube_is_a_cube_map_with_the_axes_of_vulkan() {
     let bytes = fs::read(at("blocks").join(name)).unwrap();
     let length = u64::from_le_bytes(bytes[88..96].try_into().unwrap()) as usize;
     assert_eq!(length, 6 * side * side);
+}
+
+#[test]
+fn backs_of_glass_stay_on_its_own_primitive() {
+    let lab = Lab::new();
+    let stored = lab.even("even.day", 1.0);
+    for (transmission, primitives) in [(0.0, 2), (1.0, 1)] {
+        let mut scene = lab.scene();
+        scene.materials[0].double_sided = true;
+        scene.materials[0].transmission = transmission;
+        // A second mesh of another material, whose back has no light.
+        scene.materials.push(scene.materials[0].clone());
+        scene.meshes.push(scene.meshes[0].clone());
+        scene.meshes[1].primitives[0].material = scene.materials.len() as u32 - 1;
+        scene.nodes.push(Node { mesh: Some(1), ..Node::default() });
+        let lit = [true, true, false, false];
+        let corners = lightmap::unwrap(&scene, &stored.plan.settings, Some(&lit)).unwrap().lightmap.corners;
+        assert_eq!(corners.backs.as_ref().unwrap().len(), 2);
+        let Unwrapping { scene: out, uv_set, .. } = unwrapped(&scene, &Stored { corners, ..stored.clone() }).unwrap();
+        assert_eq!(out.meshes[0].primitives.len(), primitives);
+        assert_eq!((out.meshes[1].primitives.len(), uv_set), (1, 1));
+        let sides: Vec<bool> = out.materials.iter().map(|material| material.double_sided).collect();
+        assert_eq!((sides[0], sides[sides.len() - 1]), (transmission > 0.0, true));
+    }
 }
