@@ -243,6 +243,25 @@ fn a_closed_box_that_glows_has_its_emission_over_one_less_its_albedo_from_any_ca
 }
 
 #[test]
+fn metals_of_a_diffuse_bake_are_black_as_in_the_path_tracer() {
+    with_gpu(|gpu| {
+        let (scene, lamp) = glowing_room(4.0, |stage, _| {
+            let metal = Material { metallic: 1.0, roughness: 0.6, ..Material::diffuse("metal", Vec3::splat(0.7)) };
+            let metal = stage.material(metal);
+            stage.cuboid(metal, Vec3::splat(-0.6), Vec3::splat(0.6), false);
+        });
+        let eye = view(vec3(0.9, 0.4, 1.7), vec3(0.1, 0.0, 0.6), 15.0, [16, 16]);
+        let truth = render(gpu, &scene, &eye, &matt(1), 16);
+        let most = |layers: &Layers, name: &str| layers.layer(name).unwrap().data.iter().copied().fold(0.0, f32::max);
+        assert_eq!((most(&truth, "direct"), most(&truth, "indirect")), (0.0, 0.0));
+        let baked = lightmap_of(gpu, &scene, lamp, Baking { bounces: 1, density: 4.0, ..baking(16) });
+        let found = Studio::with(gpu, scene, eye, &baked, &lamps_alone()).frame(0, &lamps_alone()).unwrap().0;
+        assert!(most(&found, "irradiance") > 1.0);
+        assert_eq!(most(&found, "indirect"), 0.0);
+    });
+}
+
+#[test]
 fn gloss_reflects_as_much_of_even_light_as_the_path_tracer_says() {
     with_gpu(|gpu| {
         for (albedo, metallic, roughness) in [(0.05, 0.0, 0.3), (0.05, 0.0, 0.9), (0.5, 0.0, 0.5), (0.7, 1.0, 0.6)] {

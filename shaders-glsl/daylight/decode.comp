@@ -37,7 +37,7 @@ layout(constant_id = 0) const uint TEXELS_OF = DAY_VIEW;
 layout(constant_id = 1) const uint FRAMES = 0u;
 // The light between two times is the line between its logarithms.
 layout(constant_id = 2) const uint LOGARITHMS = 0u;
-layout(constant_id = 4) const uint GLOSS = 1u;
+layout(constant_id = 4) const uint REFLECTS = REFLECT_GLOSS;
 
 layout(push_constant, scalar) uniform Push {
     uint side;     // of a tile, texels
@@ -255,7 +255,7 @@ void main() {
     vec3 e = light.there > 0.0 ? irradiance_of(light) : vec3(0.0);
     if (fetched > 0u) atomicAdd(fetches[(gl_WorkGroupID.x + 7u * gl_WorkGroupID.y) & 255u], fetched);
     float cosine = dot(n, to_camera(view, position));
-    vec3 reflectance = day_reflectance(texelFetch(albedo, pixel, 0), texelFetch(specular, pixel, 0), cosine, GLOSS != 0u);
+    vec3 reflectance = day_reflectance(texelFetch(albedo, pixel, 0), texelFetch(specular, pixel, 0), cosine, REFLECTS);
     vec3 bounced = reflectance * e / 3.14159265358979;
     imageStore(total, pixel, vec4(shown.rgb + bounced, 1.0));
     imageStore(indirect, pixel, vec4(bounced, 1.0));

@@ -27,7 +27,7 @@ layout(binding = 11, scalar) readonly buffer Probes { DayProbe probes[]; };
 layout(binding = 12, scalar) readonly buffer Distances { uint distances[]; };  // mean and mean square, halves; texel after texel of each probe
 layout(binding = 13, scalar) readonly buffer Light { vec3 light[]; };          // PROBE_TERMS for each probe
 
-layout(constant_id = 0) const uint GLOSS = 1u;
+layout(constant_id = 0) const uint REFLECTS = REFLECT_GLOSS;
 
 vec3 probe_irradiance(uint probe, float harmonics[PROBE_TERMS]) {
     vec3 e = vec3(0.0);
@@ -107,7 +107,7 @@ void main() {
     vec3 n = decode_normal(texelFetch(normals, pixel, 0));
     vec3 e = probes_at(position, n);
     float cosine = dot(n, to_camera(view, position));
-    vec3 reflectance = day_reflectance(texelFetch(albedo, pixel, 0), texelFetch(specular, pixel, 0), cosine, GLOSS != 0u);
+    vec3 reflectance = day_reflectance(texelFetch(albedo, pixel, 0), texelFetch(specular, pixel, 0), cosine, REFLECTS);
     vec3 bounced = reflectance * e / 3.14159265358979;
     imageStore(total, pixel, vec4(texelFetch(direct, pixel, 0).rgb + bounced, 1.0));
     imageStore(indirect, pixel, vec4(bounced, 1.0));

@@ -375,7 +375,12 @@ impl Technique for Daylight {
         let view = &moment.view;
         let gbuffer = gbuffer::draw(graph, &handles, view, &settings.gbuffer);
         let shadows = shadow::draw(graph, &handles, view, &settings.shadow);
-        let gloss = of_day.gloss && !self.baked.stored.plan.settings.diffuse_only;
+        let reflects = match (self.baked.stored.plan.settings.diffuse_only, of_day.gloss) {
+            (true, _) => consts::REFLECT_DIFFUSE,
+            (false, true) => consts::REFLECT_GLOSS,
+            (false, false) => consts::REFLECT_COLOR,
+        };
+        let gloss = reflects == consts::REFLECT_GLOSS;
         let choices = Direct { specular: gloss, ..Direct::default() };
         let lit = direct::light(graph, &gbuffer, Lights::from(&shadows), &choices);
         let image = |graph: &mut Graph, name: &str| graph.image(name, Format::RGBA16F, view.extent);
@@ -407,7 +412,7 @@ impl Technique for Daylight {
                 frames: if self.light.has_frames() { mixture.times().count() as u32 + 1 } else { 0 },
                 logarithms: logarithms.into(),
                 blocks: self.light.pages().are_there().into(),
-                gloss: gloss.into(),
+                reflects,
             },
             view: gbuffer.view,
             normal: gbuffer.normal,
@@ -453,7 +458,7 @@ impl Technique for Daylight {
             let tiles = self.baked.stored.probes.iter().map(|brick| &brick.light);
             let light = field.decode(graph, tiles, moment);
             let pixels = probes::Pixels { mask, direct: lit.direct, total, indirect, irradiance };
-            field.shine(graph, &gbuffer, view, light, &pixels, gloss);
+            field.shine(graph, &gbuffer, view, light, &pixels, reflects);
         }
         skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, total);
         skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, lit.direct);

@@ -121,7 +121,7 @@ impl Field {
         view: &View,
         light: Buffer,
         pixels: &Pixels,
-        gloss: bool,
+        reflects: u32,
     ) {
         let Pixels { mask, direct, total, indirect, irradiance } = *pixels;
         let args = probe_light::Args {
@@ -139,7 +139,7 @@ impl Field {
             probes: graph.import_buffer(&self.probes),
             distances: graph.import_buffer(&self.distances),
             light,
-            spec: probe_light::Spec { gloss: gloss.into() },
+            spec: probe_light::Spec { reflects },
         };
         graph.compute(args, view.extent);
     }
