@@ -1,7 +1,7 @@
 //! Lightmaps of whole bakes as pictures show them: closed forms, seams, things that stand in a floor, and the path tracer from other cameras.
 
 use crate::{
-    daylight_lab::{Studio, baked, lights},
+    daylight_lab::{Studio, baked, baked_with},
     daylight_light::{eye, plan},
     tracer_lab::{Stage, flat_view, matt, render, view},
 };
@@ -11,10 +11,9 @@ use lucerna::{
     image::Layers,
     scene::{Material, Scene, Transform, View},
     techniques::daylight::{
-        Backs, Baked, Baking, Group, Kind, PictureSettings, Plan, Sources, Stored, digest, finish,
+        Backs, Baked, Baking, Group, Kind, Light, PictureSettings, Plan, Sources, Stored, digest,
         gathered::Spot,
         lightmap::{self, Unwrapped},
-        units,
     },
     tracer::Settings,
 };
@@ -54,19 +53,16 @@ pub fn lightmap_lit_by(gpu: &Gpu, scene: &Scene, glowing: &[u32], settings: Baki
 fn lightmap_with(gpu: &Gpu, scene: &Scene, glowing: u32, settings: Baking, of: impl Fn(Vec3, Vec3) -> f32) -> Baked {
     let (plan, unwrapped) = planned(gpu, scene, &[glowing], settings);
     let sources = Sources::Lightmap(Box::new(unwrapped.by_tile(plan.side())));
-    let skies = units::skies(&plan).unwrap();
-    let mut tiles = lights(gpu, scene, &plan, sources);
-    for light in &mut tiles {
+    let of_tile = |light: &mut Light| {
         let value = |spot: &Spot| of(spot.position.into(), spot.normal.into());
         light.lamps = light.spots.iter().flat_map(|spot| [value(spot); 3]).collect();
         light.lamps_noise = vec![0.0; light.lamps.len()];
-    }
-    let gathered: Vec<_> = tiles.iter().map(|light| units::gathered(&plan, light, &skies).unwrap()).collect();
-    let tiles = finish::tiles(&plan, &gathered, |_| Ok(())).unwrap();
-    Baked::new(Stored { plan, tiles, probes: Vec::new(), corners: unwrapped.lightmap.corners })
+    };
+    let stored = baked_with(gpu, scene, plan, sources, of_tile, |_| ());
+    Baked::new(Stored { corners: unwrapped.lightmap.corners, ..stored })
 }
 
-fn lamps_alone() -> PictureSettings {
+pub fn lamps_alone() -> PictureSettings {
     let mut settings = PictureSettings::default();
     settings.daylight.time = "00:00".into();
     settings.daylight.lamps = "on".into();
@@ -89,7 +85,7 @@ fn seen_at(gpu: &Gpu, scene: &Scene, view: View, baked: &Baked) -> Vec<(usize, V
 }
 
 /// A room of `size` metres that glows with a radiance of 1 around bodies whose albedo is 0.5.
-fn glowing_room(size: f32, bodies: impl FnOnce(&mut Stage, u32)) -> (Scene, u32) {
+pub fn glowing_room(size: f32, bodies: impl FnOnce(&mut Stage, u32)) -> (Scene, u32) {
     let mut stage = Stage::new();
     let lamp = stage.emitter(Vec3::ONE);
     stage.cuboid(lamp, Vec3::splat(-0.5 * size), Vec3::splat(0.5 * size), true);

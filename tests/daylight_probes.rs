@@ -102,7 +102,7 @@ fn terms(probe: usize, channel: usize, of: impl Fn(usize) -> f64) -> [f64; 9] {
 }
 
 /// The twelve normals, written down independently of the engine.
-fn normal(i: usize) -> DVec3 {
+pub fn normal(i: usize) -> DVec3 {
     let golden = 0.5 * (1.0 + 5f64.sqrt());
     let (a, b) = ([1.0, -1.0][i % 2], [golden, -golden][i / 2 % 2]);
     [DVec3::new(0.0, a, b), DVec3::new(b, 0.0, a), DVec3::new(a, b, 0.0)][i / 4].normalize()

@@ -223,6 +223,26 @@ fn highlights_of_igi_and_of_the_path_tracer_have_the_brightness_of_the_closed_fo
     });
 }
 
+#[test]
+fn facets_that_face_down_reflect_no_light() {
+    with_gpu(|gpu| {
+        // The normal leans away from the viewer, and half between viewer and light is below its horizon.
+        let (normal, viewer, light) = (towards(75.0, PI), towards(30.0, 0.0), towards(12.1, 0.0));
+        assert!(normal.dot(viewer) < -0.2 && normal.dot(light) > 0.05 && normal.dot(viewer + light) < 0.0);
+        let matter = Matter { roughness: 1.0, ..matters()[3] };
+        assert_eq!(matter.facets(normal, viewer, light), DVec3::ZERO);
+        let mut stage = plate(&matter);
+        sun(&mut stage, light);
+        let plate = stage.scene.meshes.last_mut().unwrap();
+        plate.primitives[0].normals.iter_mut().for_each(|of| *of = normal.as_vec3());
+        let exact = 2.0 * matter.response(normal, viewer, light);
+        let settings = Tracing { bounces: 0, filter: Filter::Centre, ..Tracing::default() };
+        let found = mean(&render(gpu, &stage.scene, &seen(30.0, [8, 8]), &settings, 2), "direct");
+        println!("{found:?}, {exact}");
+        close("reference", DVec3::from_array(found), exact, 2e-3);
+    });
+}
+
 fn under_a_sky(matter: &Matter) -> Scene {
     Scene { environment: Some(Environment::constant(Vec3::ONE)), ..plate(matter).scene }
 }

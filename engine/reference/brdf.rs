@@ -62,7 +62,10 @@ impl Matter {
         }
         let half = (viewer + light).normalize_or(normal);
         let a2 = width(self.roughness).powi(2);
-        let (along, across) = (normal.dot(half).clamp(0.0, 1.0), normal.cross(half).length_squared());
+        let (along, across) = (normal.dot(half).min(1.0), normal.cross(half).length_squared());
+        if along <= 0.0 {
+            return DVec3::ZERO;
+        }
         let distribution = a2 / (PI * (along * along * a2 + across).powi(2));
         let both = 1.0 / (1.0 + masking(nv, a2.sqrt()) + masking(nl, a2.sqrt()));
         let fifth = (1.0 - viewer.dot(half).clamp(0.0, 1.0)).powi(5);
@@ -150,6 +153,13 @@ pub fn graze(cosine: f64, roughness: f64) -> f64 {
 
 fn lost_mean(roughness: f64) -> f64 {
     width(roughness) * polynomial(&LOST_MEAN, roughness.max(0.045))
+}
+
+/// The part of the light of facets that is left for a viewer below the horizon of the shading normal, by the fit. Twin: `brdf_below`.
+pub fn below(cosine: f64, roughness: f64) -> f64 {
+    let alpha = width(roughness);
+    let t = (-cosine).max(0.0) * (1.1 / alpha - 0.5).min(1.0 / alpha);
+    1.0 / (1.0 + t * (1.0 + 1.1 * t))
 }
 
 /// E₁ and B by brute force: `steps`² normals of visible facets.
@@ -305,6 +315,34 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn few_facets_are_seen_from_below_the_horizon() {
+        let facets = |cosine: f64, matter: &Matter| {
+            let viewer = DVec3::new((1.0 - cosine * cosine).sqrt(), 0.0, cosine);
+            let count = 200_000;
+            let sum: f64 = (0..count)
+                .map(|i| {
+                    let (z, turn) = ((f64::from(i) + 0.5) / f64::from(count), 2.399_963_229_728_653 * f64::from(i));
+                    let sine = (1.0 - z * z).sqrt();
+                    matter.facets(DVec3::Z, viewer, DVec3::new(sine * turn.cos(), sine * turn.sin(), z)).x
+                })
+                .sum();
+            2.0 * PI * sum / f64::from(count)
+        };
+        let mut worst = 0.0f64;
+        for roughness in [0.2, 0.5, 0.7, 1.0] {
+            let matter = Matter { albedo: DVec3::ZERO, f0: DVec3::splat(0.04), roughness };
+            let level = facets(1e-3, &matter);
+            for cosine in [-0.02, -0.05, -0.1, -0.2, -0.3, -0.5, -0.8] {
+                let (found, exact) = (below(cosine, roughness), facets(cosine, &matter) / level);
+                worst = worst.max((found - exact).abs());
+            }
+        }
+        println!("largest error: {worst:.4}");
+        assert!(worst < 0.08);
+        assert_eq!((below(0.0, 0.5), below(0.7, 0.5)), (1.0, 1.0));
     }
 
     #[test]

@@ -255,8 +255,9 @@ void main() {
     vec3 e = light.there > 0.0 ? irradiance_of(light) : vec3(0.0);
     if (fetched > 0u) atomicAdd(fetches[(gl_WorkGroupID.x + 7u * gl_WorkGroupID.y) & 255u], fetched);
     float cosine = dot(n, to_camera(view, position));
-    vec3 reflectance = day_reflectance(texelFetch(albedo, pixel, 0), texelFetch(specular, pixel, 0), cosine, REFLECTS);
-    vec3 bounced = reflectance * e / 3.14159265358979;
+    DayShares shares = day_shares(texelFetch(albedo, pixel, 0), texelFetch(specular, pixel, 0), cosine, REFLECTS);
+    // The directions of this light are not known: probe_light.comp follows where there are probes.
+    vec3 bounced = (shares.matt + shares.shine) * e / 3.14159265358979;
     imageStore(total, pixel, vec4(shown.rgb + bounced, 1.0));
     imageStore(indirect, pixel, vec4(bounced, 1.0));
     imageStore(irradiance, pixel, vec4(e, 1.0));

@@ -1,4 +1,5 @@
-// Indirect light of the objects that were added at run time: that of the probes around each pixel's point. Weights of the probes follow
+// Light of the probes around each pixel's point: all indirect light of the objects that were added at run time, and the directions of the light that gloss
+// reflects on all surfaces. Weights of the probes follow
 // Majercik, Guertin, Nowrouzezahrai and McGuire, Dynamic Diffuse Global Illumination with Ray-Traced Irradiance Fields (2019), section 3.3.
 #version 460
 #extension GL_EXT_scalar_block_layout : require
@@ -17,8 +18,8 @@ layout(binding = 2) uniform sampler2D depth;
 layout(binding = 3) uniform sampler2D direct;         // with emission
 layout(binding = 4) uniform sampler2D specular;       // rgb: F0; a: roughness
 layout(binding = 5) uniform sampler2D normals;
-layout(binding = 6) uniform sampler2D mask;
-// Other pixels keep what they have.
+layout(binding = 6) uniform sampler2D mask;            // above 0.5 at added objects
+// Pixels without a change keep what they have.
 layout(binding = 7, rgba16f) uniform image2D total;
 layout(binding = 8, rgba16f) uniform image2D indirect;
 layout(binding = 9, rgba16f) uniform image2D irradiance;
@@ -28,11 +29,48 @@ layout(binding = 12, scalar) readonly buffer Distances { uint distances[]; };  /
 layout(binding = 13, scalar) readonly buffer Light { vec3 light[]; };          // PROBE_TERMS for each probe
 
 layout(constant_id = 0) const uint REFLECTS = REFLECT_GLOSS;
+// There are added objects, and they have the light of probes.
+layout(constant_id = 1) const uint ADDED = 1u;
+// Gloss reflects the light of the probes in its direction.
+layout(constant_id = 2) const uint DIRECTED = 1u;
 
-vec3 probe_irradiance(uint probe, float harmonics[PROBE_TERMS]) {
-    vec3 e = vec3(0.0);
-    for (uint k = 0u; k < PROBE_TERMS; ++k) e += harmonics[k] * light[probe * PROBE_TERMS + k];
-    return max(e, vec3(0.0));
+// Light around a point.
+struct ProbeLight {
+    vec3 irradiance;  // of the normal, W/m²
+    vec3 even;        // π times the mean radiance of all directions
+    vec3 lobe;        // π times what the mean radiance in the lobe that gloss reflects has beyond it
+    float there;      // 1; 0: no probe has light
+};
+
+// Of one probe. `along`: harmonics of the axis of the lobe, by its zonal harmonics and by the radiance for 1 W/m² of irradiance.
+ProbeLight probe_light(uint probe, float harmonics[PROBE_TERMS], float along[PROBE_TERMS]) {
+    ProbeLight result = ProbeLight(vec3(0.0), vec3(0.0), vec3(0.0), 1.0);
+    for (uint k = 0u; k < PROBE_TERMS; ++k) {
+        vec3 term = light[probe * PROBE_TERMS + k];
+        result.irradiance += harmonics[k] * term;
+        if (k == 0u) result.even = along[k] * term; else result.lobe += along[k] * term;
+    }
+    result.irradiance = max(result.irradiance, vec3(0.0));
+    return result;
+}
+
+void add(inout ProbeLight sum, ProbeLight of, float weight) {
+    sum.irradiance += weight * of.irradiance;
+    sum.even += weight * of.even;
+    sum.lobe += weight * of.lobe;
+    sum.there += weight;
+}
+
+ProbeLight mean(ProbeLight sum) {
+    return ProbeLight(sum.irradiance / sum.there, sum.even / sum.there, sum.lobe / sum.there, 1.0);
+}
+
+// The harmonics that sum up to the mean of a lobe around an axis. Irradiance is radiance by the zonal harmonics of the cosine, relative to π: 1, 2/3, 1/4.
+float[PROBE_TERMS] lobe_harmonics(vec3 axis, float alpha) {
+    float result[PROBE_TERMS] = probe_harmonics(axis);
+    vec2 sharper = day_lobe(alpha) * vec2(1.5, 4.0);
+    for (uint k = 1u; k < PROBE_TERMS; ++k) result[k] *= k < 4u ? sharper.x : sharper.y;
+    return result;
 }
 
 // Mean and mean square of the distance to the surfaces around a probe, bilinear between texels. Neighbours over a border of the octahedral map
@@ -55,8 +93,10 @@ vec2 probe_distance(uint probe, vec3 direction) {
     return sum;
 }
 
-vec3 probes_at(vec3 position, vec3 normal) {
+// `axis`, `alpha`: of the gloss.
+ProbeLight probes_at(vec3 position, vec3 normal, vec3 axis, float alpha) {
     float harmonics[PROBE_TERMS] = probe_harmonics(normal);
+    float along[PROBE_TERMS] = lobe_harmonics(axis, alpha);
     // Off the surface, so that surfaces beside it do not hide the probes.
     float closest = min(grid.spacing.x, min(grid.spacing.y, grid.spacing.z));
     vec3 point = position + 0.1 * closest * normal;
@@ -64,8 +104,8 @@ vec3 probes_at(vec3 position, vec3 normal) {
     vec3 place = clamp((point - grid.origin) / grid.spacing, vec3(0.0), last);
     vec3 corner = min(floor(place), max(last - 1.0, vec3(0.0)));
     vec3 f = place - corner;
-    vec4 sum = vec4(0.0);
-    vec4 plain = vec4(0.0);
+    ProbeLight sum = ProbeLight(vec3(0.0), vec3(0.0), vec3(0.0), 0.0);
+    ProbeLight plain = sum;
     for (uint i = 0u; i < 8u; ++i) {
         vec3 step = vec3(uvec3(i, i >> 1u, i >> 2u) & 1u);
         vec3 share = mix(1.0 - f, f, step);
@@ -74,8 +114,8 @@ vec3 probes_at(vec3 position, vec3 normal) {
         uint number = probe_number(grid, uvec3(min(corner + step, last)));
         uint near = probes[number].near;
         if (near == NONE) continue;
-        vec3 e = probe_irradiance(near, harmonics);
-        plain += weight * vec4(e, 1.0);
+        ProbeLight of = probe_light(near, harmonics, along);
+        add(plain, of, weight);
         if (near != number) continue;
         vec3 away = point - probes[number].position;
         float far = length(away);
@@ -91,24 +131,48 @@ vec3 probes_at(vec3 position, vec3 normal) {
             float seen = spread / (spread + beyond * beyond);
             weight *= max(seen * seen * seen, 0.001);
         }
-        sum += weight * vec4(e, 1.0);
+        add(sum, of, weight);
     }
-    if (sum.a > 1e-4) return sum.rgb / sum.a;
+    if (sum.there > 1e-4) return mean(sum);
     // No probe sees the point.
-    return plain.a > 0.0 ? plain.rgb / plain.a : vec3(0.0);
+    return plain.there > 0.0 ? mean(plain) : plain;
+}
+
+// The light of the lobe, as the irradiance of light from everywhere alike. Few harmonics swing below zero beside bright light: they are then weaker in all
+// channels, so that colours stay.
+vec3 lobe_light(ProbeLight here) {
+    float window = 1.0;
+    for (uint c = 0u; c < 3u; ++c) {
+        if (here.even[c] + window * here.lobe[c] < 0.0) window = here.even[c] / -here.lobe[c];
+    }
+    return max(here.even + window * here.lobe, vec3(0.0));
 }
 
 void main() {
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     ivec2 size = imageSize(total);
-    if (any(greaterThanEqual(pixel, size)) || texelFetch(mask, pixel, 0).r < 0.5) return;
-    vec2 uv = (vec2(pixel) + 0.5) / vec2(size);
-    vec3 position = world_from_depth(view, uv, texelFetch(depth, pixel, 0).r);
+    if (any(greaterThanEqual(pixel, size))) return;
+    float far = texelFetch(depth, pixel, 0).r;
+    if (far >= 1.0) return;
+    bool added = ADDED != 0u && texelFetch(mask, pixel, 0).r >= 0.5;
+    if (!added && DIRECTED == 0u) return;
+    vec3 position = world_from_depth(view, (vec2(pixel) + 0.5) / vec2(size), far);
     vec3 n = decode_normal(texelFetch(normals, pixel, 0));
-    vec3 e = probes_at(position, n);
-    float cosine = dot(n, to_camera(view, position));
-    vec3 reflectance = day_reflectance(texelFetch(albedo, pixel, 0), texelFetch(specular, pixel, 0), cosine, REFLECTS);
-    vec3 bounced = reflectance * e / 3.14159265358979;
+    vec3 v = to_camera(view, position);
+    vec4 gloss = texelFetch(specular, pixel, 0);
+    DayShares shares = day_shares(texelFetch(albedo, pixel, 0), gloss, dot(n, v), REFLECTS);
+    if (!added && shares.shine == vec3(0.0)) return;
+    float alpha = brdf_alpha(gloss.a);
+    ProbeLight here = probes_at(position, n, day_lobe_axis(n, v, alpha), alpha);
+    vec3 e = added ? here.irradiance : imageLoad(irradiance, pixel).rgb;
+    vec3 reflected = e;
+    if (DIRECTED != 0u && here.there > 0.0) {
+        // Where the surface has less light than the probes, as in a corner, it reflects less of their light. What it has beyond the light of the probes, as that of
+        // a lamp close by, has no direction.
+        vec3 shared_part = min(e, here.irradiance);
+        reflected = lobe_light(here) * shared_part / max(here.irradiance, vec3(1e-30)) + e - shared_part;
+    }
+    vec3 bounced = (shares.matt * e + shares.shine * reflected) / 3.14159265358979;
     imageStore(total, pixel, vec4(texelFetch(direct, pixel, 0).rgb + bounced, 1.0));
     imageStore(indirect, pixel, vec4(bounced, 1.0));
     imageStore(irradiance, pixel, vec4(e, 1.0));

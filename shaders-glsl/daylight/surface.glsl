@@ -76,8 +76,9 @@ DaySurface day_surface(uint instance, uint triangle, vec2 barycentrics, vec3 tow
         // Gloss is taken as diffuse: its energy stays, its direction is lost.
         float dielectric = (ior - 1.0) * (ior - 1.0) / ((ior + 1.0) * (ior + 1.0));
         vec3 f0 = mix(vec3(dielectric), base.rgb, metallic);
-        Brdf b = brdf_of(s.albedo, f0, roughness, clamp(dot(normal, -toward), 0.0, 1.0));
-        s.albedo = min(b.matt + b.shine, vec3(1.0));
+        float cosine = dot(normal, -toward);
+        Brdf b = brdf_of(s.albedo, f0, roughness, clamp(cosine, 0.0, 1.0));
+        s.albedo = min(b.matt + b.shine * brdf_below(b, cosine), vec3(1.0));
     }
     return s;
 }

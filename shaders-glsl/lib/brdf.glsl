@@ -142,7 +142,10 @@ vec3 brdf_specular_cosine(Brdf b, vec3 n, vec3 v, vec3 l) {
     float nl = dot(n, l);
     if (nl <= 0.0 || b.f90 <= 0.0) return vec3(0.0);
     vec3 h = normalize(v + l);
-    float ggx = ggx_distribution(clamp(dot(n, h), 0.0, 1.0), length(cross(n, h)), b.alpha);
+    // No facet faces downwards. The viewer is below the horizon of a shading normal that leans away from it.
+    float nh = dot(n, h);
+    if (nh <= 0.0) return vec3(0.0);
+    float ggx = ggx_distribution(min(nh, 1.0), length(cross(n, h)), b.alpha);
     float a2 = b.alpha * b.alpha;
     float smith = 0.5 / (nl * sqrt(b.nv * b.nv * (1.0 - a2) + a2) + b.nv * sqrt(nl * nl * (1.0 - a2) + a2));
     return ggx * smith * nl * brdf_schlick(b.f0, b.f90, clamp(dot(v, h), 0.0, 1.0));
@@ -157,6 +160,13 @@ vec3 brdf_cosine(Brdf b, vec3 n, vec3 v, vec3 l) {
     float graze = brdf_graze(b, nl, lost);
     vec3 matt = b.base * brdf_open(b, lost, graze) + b.multiple * lost;
     return matt * (nl / BRDF_PI) + brdf_specular_cosine(b, n, v, l);
+}
+
+// The part of `shine` that is left for a viewer below the horizon of the shading normal (`cosine` < 0), from where few facets are seen. Within 0.08 of the integrals
+// of brdf_specular_cosine for dielectrics.
+float brdf_below(Brdf b, float cosine) {
+    float t = max(-cosine, 0.0) * min(1.1 / b.alpha - 0.5, 1.0 / b.alpha);
+    return 1.0 / (1.0 + t * (1.0 + 1.1 * t));
 }
 
 #endif

@@ -16,6 +16,7 @@ use lucerna::{
         layer::Layer,
         lightmap::Corners,
         parts,
+        probes::Brick,
         units::{self, Tile},
     },
 };
@@ -134,13 +135,36 @@ pub fn lights(gpu: &Gpu, scene: &Scene, plan: &Plan, sources: Sources) -> Vec<Li
     (0..plan.tile_count()).map(|tile| transport.tile(plan, tile).unwrap()).collect()
 }
 
-/// A bake without probes, filtered and compressed as a file has it.
+/// A bake, filtered and compressed as a file has it.
 pub fn baked(gpu: &Gpu, scene: &Scene, plan: Plan, sources: Sources) -> Stored {
+    baked_with(gpu, scene, plan, sources, |_| (), |_| ())
+}
+
+/// The same with changes of the light of tiles and of bricks before they are compressed.
+pub fn baked_with(
+    gpu: &Gpu,
+    scene: &Scene,
+    plan: Plan,
+    sources: Sources,
+    of_tile: impl Fn(&mut Light),
+    of_brick: impl Fn(&mut Light),
+) -> Stored {
     let skies = units::skies(&plan).unwrap();
-    let tiles = lights(gpu, scene, &plan, sources);
-    let gathered: Vec<_> = tiles.iter().map(|light| units::gathered(&plan, light, &skies).unwrap()).collect();
+    let mut transport = Transport::new(gpu, scene, &plan, sources).unwrap();
+    let mut gathered = Vec::new();
+    for tile in 0..plan.tile_count() {
+        let mut light = transport.tile(&plan, tile).unwrap();
+        of_tile(&mut light);
+        gathered.push(units::gathered(&plan, &light, &skies).unwrap());
+    }
     let tiles = finish::tiles(&plan, &gathered, |_| Ok(())).unwrap();
-    Stored { plan, tiles, probes: Vec::new(), corners: Corners::default() }
+    let mut probes = Vec::new();
+    for index in 0..plan.brick_count() {
+        let mut brick = transport.brick(&plan, index).unwrap();
+        of_brick(&mut brick.light);
+        probes.push(Brick::compress(&plan, brick, &skies).unwrap());
+    }
+    Stored { plan, tiles, probes, corners: Corners::default() }
 }
 
 /// A program that renders frames.

@@ -19,6 +19,8 @@ mod daylight_day;
 mod daylight_exact;
 #[path = "../daylight_frames.rs"]
 mod daylight_frames;
+#[path = "../daylight_gloss.rs"]
+mod daylight_gloss;
 #[path = "../daylight_lamps.rs"]
 mod daylight_lamps;
 #[path = "../daylight_light.rs"]

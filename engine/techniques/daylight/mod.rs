@@ -63,7 +63,7 @@ pub use frames::Frames;
 pub use light::Light;
 pub use masks::Cells;
 pub use plan::{Calendar, Group, Kind, Lit, MOST_TIMES, NEXT_DAY, Plan, SunPoint, digest, parts};
-pub use settings::{Added, Baking, Interpolation, PictureSettings, Sampling, Settings, SkyLight};
+pub use settings::{Added, Baking, Interpolation, PictureSettings, Reflections, Sampling, Settings, SkyLight};
 pub use sky::Sky;
 pub use technique::{Daylight, Mode};
 pub use transport::{Sources, Transport};

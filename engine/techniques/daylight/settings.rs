@@ -182,6 +182,18 @@ pub enum Added {
     Screen,
 }
 
+/// Where gloss finds the directions of the baked light.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Reflections {
+    /// From the probes around the point, if the bake has any: gloss reflects their light along the mirrored direction, by as much as the surface has of their
+    /// irradiance. They know no detail smaller than a quarter of the sphere.
+    #[default]
+    Probes,
+    /// Nowhere: gloss reflects as much as of light from everywhere alike.
+    Even,
+}
+
 /// How images in blocks reach a picture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -226,12 +238,13 @@ pub struct Settings {
     pub interpolation: Interpolation,
     /// The indirect light of objects that are added at run time.
     pub added: Added,
+    /// Where gloss finds the directions of the baked light.
+    pub reflections: Reflections,
     /// How the light of the sky is found.
     pub sky: SkyLight,
     /// How images of the bake that are in blocks reach a picture.
     pub blocks: Sampling,
-    /// Direct light of the sun has highlights, and surfaces reflect as much of the baked light by their gloss as of light from everywhere alike. If
-    /// off, direct light is by Lambert's law alone, and metals reflect the baked light as diffuse surfaces of their colour. A bake with
+    /// Direct light of the sun has highlights, and surfaces reflect the baked light by their gloss, too (`reflections`). If off, direct light is by Lambert's law alone, and metals reflect the baked light as diffuse surfaces of their colour. A bake with
     /// `diffuse_only` is shown as if off.
     pub gloss: bool,
     /// Haze of the air: 1 is clear mountain air, 10 is thick haze.
@@ -264,6 +277,7 @@ impl Default for Settings {
             minutes: 5.0,
             interpolation: Interpolation::default(),
             added: Added::default(),
+            reflections: Reflections::default(),
             sky: SkyLight::default(),
             blocks: Sampling::default(),
             gloss: true,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use glam::{Vec2, Vec3};
 
 use super::{
-    Added, Baked, Course, Group, PictureSettings, Sampling, Settings, Sky, SkyLight, Stored, added,
+    Added, Baked, Course, Group, PictureSettings, Reflections, Sampling, Settings, Sky, SkyLight, Stored, added,
     cube::Around,
     lamps,
     on_device::OnDevice,
@@ -324,7 +324,7 @@ impl Technique for Daylight {
             light: OnDevice::new(gpu, baked)?,
             places: Places::new(gpu, base, baked)?,
             added,
-            probes: if added.is_some() { Field::new(gpu, stored).map_err(|error| baked.blamed(error))? } else { None },
+            probes: Field::new(gpu, stored).map_err(|error| baked.blamed(error))?,
             around: Around::new(gpu, base, &stored.plan)?,
             sky: None,
         })
@@ -439,9 +439,8 @@ impl Technique for Daylight {
         };
         graph.compute(args, view.extent);
         let mut of_lamps = Vec::new();
-        if let (Some(first), Some(field)) = (of_probes, &self.probes) {
-            let linear = mixture.linear();
-            let mask = added::mask(graph, &handles, view, &gbuffer, first);
+        let mask = of_probes.map(|first| added::mask(graph, &handles, view, &gbuffer, first));
+        if let Some(mask) = mask {
             let groups = lamps::placed(moment.scene, &self.baked.stored.plan.lamps);
             let burn = added::burning(&moment.handles.moment.lights, groups, &burning);
             if !burn.is_empty() {
@@ -454,11 +453,15 @@ impl Technique for Daylight {
                     (&settings.shadow, gloss),
                 );
             }
+        }
+        let directed = gloss && of_day.reflections == Reflections::Probes;
+        if let Some(field) = self.probes.as_ref().filter(|_| directed || mask.is_some()) {
+            let linear = mixture.linear();
             let moment = probes::Moment { weights: &linear, sun: light, patches: &patches, lamps: &burning };
             let tiles = self.baked.stored.probes.iter().map(|brick| &brick.light);
             let light = field.decode(graph, tiles, moment);
             let pixels = probes::Pixels { mask, direct: lit.direct, total, indirect, irradiance };
-            field.shine(graph, &gbuffer, view, light, &pixels, reflects);
+            field.shine(graph, &gbuffer, view, light, &pixels, (reflects, directed));
         }
         skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, total);
         skybox::draw(graph, &handles, &gbuffer, Vec3::ZERO, lit.direct);

@@ -19,7 +19,7 @@ use crate::{
 /// The name of such jobs.
 pub const KIND: &str = "daylight";
 /// Increased whenever the computation changes.
-const VERSION: u32 = 11;
+const VERSION: u32 = 12;
 /// Largest number that a list in a unit may have.
 const MOST_WORDS: u64 = 1 << 32;
 

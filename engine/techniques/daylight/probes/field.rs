@@ -41,11 +41,11 @@ pub struct Moment<'a> {
     pub lamps: &'a [[f32; 3]],
 }
 
-/// The images that change at the pixels of added objects.
+/// The images that change at the pixels of added objects and of glossy surfaces.
 #[derive(Clone, Copy, Debug)]
 pub struct Pixels {
-    /// Above 0.5 at pixels of added objects.
-    pub mask: Image,
+    /// Above 0.5 at pixels of added objects, if there are any.
+    pub mask: Option<Image>,
     /// Direct light with emission.
     pub direct: Image,
     pub total: Image,
@@ -113,7 +113,8 @@ impl Field {
         light
     }
 
-    /// Replaces the indirect light at the pixels of added objects. `light`: of [`Self::decode`]; `gloss`: reflects it.
+    /// Replaces the indirect light at the pixels of added objects, and of the gloss of all surfaces if it is `directed`. `light`: of [`Self::decode`]; `reflects`:
+    /// REFLECT_ of daylight/reflect.glsl.
     pub fn shine(
         &self,
         graph: &mut Graph,
@@ -121,7 +122,7 @@ impl Field {
         view: &View,
         light: Buffer,
         pixels: &Pixels,
-        reflects: u32,
+        (reflects, directed): (u32, bool),
     ) {
         let Pixels { mask, direct, total, indirect, irradiance } = *pixels;
         let args = probe_light::Args {
@@ -131,7 +132,7 @@ impl Field {
             direct,
             specular: gbuffer.specular,
             normals: gbuffer.normal,
-            mask,
+            mask: mask.unwrap_or(gbuffer.depth),
             total,
             indirect,
             irradiance,
@@ -139,7 +140,7 @@ impl Field {
             probes: graph.import_buffer(&self.probes),
             distances: graph.import_buffer(&self.distances),
             light,
-            spec: probe_light::Spec { reflects },
+            spec: probe_light::Spec { reflects, added: mask.is_some().into(), directed: directed.into() },
         };
         graph.compute(args, view.extent);
     }

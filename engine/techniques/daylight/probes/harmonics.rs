@@ -59,9 +59,37 @@ pub fn irradiance(terms: &[f64; TERMS], normal: DVec3) -> f64 {
     harmonics(normal).iter().zip(terms).map(|(a, b)| a * b).sum()
 }
 
+/// Bands 1 and 2 of the zonal harmonics of the lobe of light that GGX microfacets of width `alpha` reflect to a viewer at the normal, relative to band 0:
+/// 2/3 and 1/4 for `alpha` 1, as those of the cosine, and 1 for a mirror. Twin of `day_lobe` (`reflect.glsl`).
+pub fn lobe(alpha: f64) -> [f64; 2] {
+    [(0.602, 1.0 / 3.0), (1.512, 0.75)].map(|(slope, end)| 1.0 - alpha * (slope - alpha * (slope - end)))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn lobes_have_the_harmonics_of_their_integrals() {
+        for alpha in [0.002, 0.04, 0.1, 0.25, 0.5, 0.8, 1.0] {
+            let (mut weight, mut bands) = (0.0, [0.0; 2]);
+            let count = 100_000;
+            for i in 0..count {
+                // The square of the cosine of a normal of GGX facets (Walter et al. 2007, equation 35), and the cosine of the light that it mirrors.
+                let u = (f64::from(i) + 0.5) / f64::from(count);
+                let square = (1.0 - u) / (1.0 + (alpha * alpha - 1.0) * u);
+                let cosine = 2.0 * square - 1.0;
+                if cosine > 0.0 {
+                    weight += cosine;
+                    bands[0] += cosine * cosine;
+                    bands[1] += cosine * (1.5 * cosine * cosine - 0.5);
+                }
+            }
+            let [one, two] = lobe(alpha);
+            assert!((one - bands[0] / weight).abs() < 0.014, "{alpha}: {one}, {}", bands[0] / weight);
+            assert!((two - bands[1] / weight).abs() < 0.026, "{alpha}: {two}, {}", bands[1] / weight);
+        }
+    }
 
     fn sphere(count: usize) -> impl Iterator<Item = DVec3> {
         (0..count).map(move |i| {

@@ -16,12 +16,13 @@ use crate::{
 };
 
 /// Techniques of pictures and their names in tables.
-const DAYS: [(&str, &str); 9] = [
+const DAYS: [(&str, &str); 10] = [
     ("day", "the day of the experiment"),
     ("cube", "the same day, from a cube"),
     ("lightmap", "the same day, from a lightmap"),
     ("coarse lightmap", "the same day, from a coarse lightmap"),
     ("lightmap without backs", "the same day, from a lightmap without texels on backs"),
+    ("lightmap without directions", "the same day, from a lightmap; gloss without directions"),
     ("probes", "the same day with a pot, lit by probes"),
     ("diffuse", "the same day, diffuse surfaces on both sides"),
     ("overcast", "the same day, overcast"),
@@ -60,7 +61,7 @@ pub(super) fn pairs<'a>(results: &'a Results, view: (&'a str, &'a str), name: &s
 
 /// Name of the reference of a technique.
 fn reference_of(name: &str) -> String {
-    let is_same_light = matches!(name, "cube" | "lightmap" | "coarse lightmap" | "lightmap without backs");
+    let is_same_light = matches!(name, "cube" | "coarse lightmap") || name.starts_with("lightmap");
     let day = if is_same_light { "day" } else { name };
     format!("{day}, truth")
 }

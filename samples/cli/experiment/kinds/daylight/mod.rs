@@ -13,7 +13,7 @@ use lucerna::{
     image::{Layer, Layers, Precision},
     scene::{Environment, Light, LightKind, Node, Pose, Scene, Transform, environment::direction_from_uv},
     technique::Settings as _,
-    techniques::daylight::{Baking, PictureSettings, Settings, Sky},
+    techniques::daylight::{Baking, PictureSettings, Reflections, Settings, Sky},
     tracer,
 };
 use serde::{Deserialize, Serialize};
@@ -126,7 +126,9 @@ pub(super) fn truth_settings(paper: bool, changes: &Changes) -> Result<Value> {
 pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>) -> Result<Option<Rendered>> {
     let OfPicture { day, kind, bake, picture, object } = read(job.settings)?;
     let gpu = warm.gpu.clone();
-    let probes = object.is_some();
+    // Added objects have the light of probes, and gloss has its directions.
+    let gloss = picture.daylight.gloss && picture.daylight.reflections == Reflections::Probes && !bake.diffuse_only;
+    let probes = object.is_some() || gloss;
     let Some(bake) = baked::of(warm, job, (&day, kind, &bake), probes)? else { return Ok(None) };
     let rendered = bake.render(&gpu, job, &picture, &object)?;
     Ok(rendered.map(|mut rendered| {

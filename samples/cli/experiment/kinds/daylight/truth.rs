@@ -14,7 +14,7 @@ use super::{Job, OfTruth, Rendered, Times, Warm, dark, lit};
 const OF_DIRECT: u32 = 4;
 
 /// Layers as those of baked daylight: `direct` is the light that surfaces have from the sun directly, and the sky behind the scene; `indirect` is
-/// all other light.
+/// all other light, that of the sky in mirrors included.
 pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>, settings: OfTruth) -> Result<Option<Rendered>> {
     let OfTruth { day, daylight, samples, mut tracer, object } = settings;
     tracer.seed = tracer.seed.wrapping_add(job.seed);
@@ -30,10 +30,12 @@ pub(super) fn picture(warm: &mut Warm<'_>, job: &Job<'_>, settings: OfTruth) -> 
         return Ok(None);
     }
     let all = running.layers()?;
-    let of_sun = tracer::Settings { bounces: 0, sources: tracer::Sources::Punctual, ..tracer };
+    let at_once = tracer::Settings { bounces: 0, specular_bounces: 0, ..tracer };
+    let of_sun = tracer::Settings { sources: tracer::Sources::Punctual, ..at_once.clone() };
     let of_sun = running.render(job.view, &of_sun, OF_DIRECT)?;
+    let seen = running.render(job.view, &at_once, OF_DIRECT)?;
     let total = pixels(&all, "");
-    let direct = sums(&pixels(&of_sun, "direct"), &pixels(&all, "emission"), 1.0);
+    let direct = sums(&pixels(&of_sun, "direct"), &pixels(&seen, "emission"), 1.0);
     let indirect = sums(&total, &direct, -1.0);
     let [width, height] = job.view.extent;
     let layers = Layers::new(width, height)
