@@ -3,7 +3,8 @@
 use std::sync::Arc;
 
 use crate::{
-    daylight_probes::{baking, eye, picture_by, plan, room, stored_of},
+    daylight_added::picture_by,
+    daylight_probes::{baking, eye, plan, room, stored_of},
     tracer_lab::{Stage, render},
 };
 use glam::{Mat4, Vec3, vec3};

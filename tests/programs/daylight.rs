@@ -5,6 +5,8 @@ mod daylight_lab;
 #[path = "../tracer_lab/mod.rs"]
 mod tracer_lab;
 
+#[path = "../daylight_added.rs"]
+mod daylight_added;
 #[path = "../daylight_added_lamps.rs"]
 mod daylight_added_lamps;
 #[path = "../daylight_backs.rs"]
