@@ -176,31 +176,6 @@ impl Moments {
         Ok(())
     }
 
-    /// The products of rows times a vector.
-    pub fn times(&self, vector: &[f64]) -> Vec<f64> {
-        let mut out = vec![0.0; self.dimensions];
-        let mut products = self.products.iter();
-        for a in 0..self.dimensions.min(vector.len()) {
-            for (b, product) in (0..=a).zip(&mut products) {
-                out[a] += product * vector[b];
-                if b < a {
-                    out[b] += product * vector[a];
-                }
-            }
-        }
-        out
-    }
-
-    /// Removes what all rows have along a vector, if the products of these parts with the rest of the rows are 0: `square` times the products of the vector.
-    pub fn without(&mut self, vector: &[f64], square: f64) {
-        let mut products = self.products.iter_mut();
-        for (a, value) in vector.iter().enumerate().take(self.dimensions) {
-            for (b, product) in vector[..=a].iter().zip(&mut products) {
-                *product -= square * value * b;
-            }
-        }
-    }
-
     /// The basis of all rows that were added.
     ///
     /// # Errors

@@ -77,92 +77,29 @@ impl Columns<'_> {
         weights.iter_mut().filter(|weight| **weight < LEAST * largest).for_each(|weight| *weight = 0.0);
         weights
     }
-
-    /// The mean of all columns, each relative to its mean over the tile, as a sum of weighted dimensions.
-    fn mean(self, light: Measured<'_>, weights: &[f64]) -> Vec<f64> {
-        let mut of = vec![0.0; light.dimensions];
-        match self {
-            Columns::Dimensions => of.fill(1.0),
-            Columns::Mixtures(mixtures) => {
-                for mixture in mixtures.chunks_exact(light.dimensions.max(1)) {
-                    let scale = inverse(light.mean(light.rows, |row| mixed(row, mixture)));
-                    of.iter_mut().zip(mixture).for_each(|(of, part)| *of += f64::from(*part) * scale);
-                }
-                of.iter_mut().zip(weights).for_each(|(of, weight)| *of *= inverse(*weight));
-            }
-        }
-        let count = weights.iter().filter(|weight| **weight > 0.0).count().max(1) as f64;
-        of.iter_mut().zip(weights).for_each(|(of, weight)| *of = if *weight > 0.0 { *of / count } else { 0.0 });
-        of
-    }
 }
 
 /// Weighted rows, and the principal components of what the halves have in common.
 #[derive(Debug)]
 pub(super) struct Weighted {
-    /// Without what the first image describes.
     pub scaled: Vec<f32>,
-    /// The first image, if there is noise.
-    pub mean: Option<MeanImage>,
     pub basis: Basis,
 }
 
-/// An image of the mean of all columns, each relative to its mean over the tile. Noise may hide the components of dim texels beside bright ones. Their light must not be lost: after
-/// this image, what is left of each texel has a mean of 0.
-#[derive(Debug)]
-pub(super) struct MeanImage {
-    /// The mean of each row.
-    pub values: Vec<f64>,
-    /// Its part of each weighted dimension.
-    pub of: Vec<f64>,
-    /// What each weighted dimension has of the image, by least squares of what the halves have in common.
-    pub vector: Vec<f64>,
-}
-
 impl Weighted {
-    pub fn new(light: Measured<'_>, columns: Columns<'_>, weights: &[f64], most: usize) -> Result<Self> {
-        let (mut scaled, noise) = (times(light.rows, weights), times(light.noise, weights));
+    pub fn new(light: Measured<'_>, weights: &[f64], most: usize) -> Result<Self> {
+        let (scaled, noise) = (times(light.rows, weights), times(light.noise, weights));
         let ones = vec![1.0; light.lines()];
         let mut moments = Moments::new(light.dimensions);
         moments.add(&scaled, &ones)?;
-        let mut mean = None;
-        if !noise.is_empty() && most > 0 {
+        if !noise.is_empty() {
             let mut of_noise = Moments::new(light.dimensions);
             of_noise.add(&noise, &ones)?;
             moments.without_noise(&of_noise)?;
-            mean = MeanImage::new(&scaled, columns.mean(light, weights), &moments);
         }
-        if let Some(mean) = &mean {
-            moments.without(&mean.vector, dot(&mean.of, &moments.times(&mean.of)));
-            deflate(&mut scaled, &mean.values, &mean.vector);
-        }
-        let basis = moments.basis(Centre::Origin, Keep::Count(most - usize::from(mean.is_some())))?;
-        Ok(Self { scaled, mean, basis })
+        let basis = moments.basis(Centre::Origin, Keep::Count(most))?;
+        Ok(Self { scaled, basis })
     }
-}
-
-impl MeanImage {
-    /// `None`: noise hides the mean, too.
-    fn new(scaled: &[f32], of: Vec<f64>, moments: &Moments) -> Option<Self> {
-        let along = moments.times(&of);
-        let square = dot(&of, &along);
-        let vector: Vec<f64> = along.iter().map(|along| along / square).collect();
-        let values: Vec<f64> = project(scaled, &of).collect();
-        let with_noise = dot(&values, &values);
-        let known = square > 0.1 * with_noise && vector.iter().all(|value| value.is_finite());
-        known.then_some(Self { values, of, vector })
-    }
-}
-
-/// Takes from each row its value times a vector.
-pub(super) fn deflate(rows: &mut [f32], values: &[f64], vector: &[f64]) {
-    for (row, value) in rows.chunks_exact_mut(vector.len().max(1)).zip(values) {
-        row.iter_mut().zip(vector).for_each(|(of, along)| *of -= (value * along) as f32);
-    }
-}
-
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// Rows times the weights of their dimensions.
@@ -252,18 +189,15 @@ impl Rest {
         take(&mut self.values, &of_columns, values);
     }
 
-    /// Removes the noise along a vector of the weighted dimensions. `of`: the sum of weighted dimensions that is the value of the image.
-    pub fn remove_noise(&mut self, of: &[f64], vector: &[f64], weights: &[f64]) {
+    /// Removes the noise along a vector of the weighted dimensions.
+    pub fn remove_noise(&mut self, vector: &[f64], weights: &[f64]) {
         if self.noise.is_empty() {
             return;
         }
-        let into: Vec<f64> = of.iter().zip(weights).map(|(v, w)| v * w).collect();
-        let values: Vec<f64> = project(&self.noise_rows, &into).collect();
-        let along = |(v, w): (&f64, &f64)| if *w > 0.0 { v / w } else { 0.0 };
-        let along: Vec<f64> = vector.iter().zip(weights).map(along).collect();
-        deflate(&mut self.noise_rows, &values, &along);
-        let along: Vec<f32> = along.iter().map(|along| *along as f32).collect();
-        let values: Vec<f32> = values.iter().map(|value| *value as f32).collect();
+        let into: Vec<f64> = vector.iter().zip(weights).map(|(v, w)| v * w).collect();
+        let values: Vec<f32> = project(&self.noise_rows, &into).map(|value| value as f32).collect();
+        let along = |(v, w): (&f64, &f64)| if *w > 0.0 { (v / w) as f32 } else { 0.0 };
+        let along: Vec<f32> = vector.iter().zip(weights).map(along).collect();
         let of_columns = self.of_columns(&along);
         take(&mut self.noise, &of_columns, &values);
     }

@@ -65,28 +65,17 @@ impl<'a> Parts<'a> {
         if texels == 0 || weights.iter().all(|w| *w == 0.0) {
             return Ok(None);
         }
-        let weighted = Weighted::new(light, columns, &weights, aim.most)?;
+        let weighted = Weighted::new(light, &weights, aim.most)?;
         Ok(Some(Self { light, columns, aim, weights, weighted }))
     }
 
     /// The layer, and whether it is within the tolerance.
     fn compressed(&self, choice: Choice<'_>) -> Result<(Layer, bool)> {
-        let Self { light, columns, aim, weights, weighted: Weighted { scaled, mean, basis } } = self;
+        let Self { light, columns, aim, weights, weighted: Weighted { scaled, basis } } = self;
         let (light, columns, aim) = (*light, *columns, *aim);
         let texels = light.rows.len() / light.dimensions.max(1) / 3;
         let mut rest = Rest::new(light, columns);
         let mut images: Vec<Image> = Vec::new();
-        // In units of light: what a dimension has at a coefficient of 1. Dimensions without light stay without.
-        let in_light = |vector: &[f64]| -> Vec<f64> {
-            vector.iter().zip(weights).map(|(v, w)| if *w > 0.0 { v / w } else { 0.0 }).collect()
-        };
-        if let Some(mean) = mean {
-            let values: Vec<f32> = mean.values.iter().map(|value| *value as f32).collect();
-            let image = Image::new(&values, in_light(&mean.vector), &mean.vector, aim.tolerance, (true, choice))?;
-            rest.remove(&image.table, &image.decoded);
-            rest.remove_noise(&mean.of, &mean.vector, weights);
-            images.push(image);
-        }
         let mut state = rest.state(aim.tolerance);
         for index in 0..basis.len() {
             if state.within {
@@ -97,11 +86,13 @@ impl<'a> Parts<'a> {
                 }
             }
             let vector = basis.vector(index);
+            // In units of light: what a dimension has at a coefficient of 1. Dimensions without light stay without.
+            let along: Vec<f64> = vector.iter().zip(weights).map(|(v, w)| if *w > 0.0 { v / w } else { 0.0 }).collect();
             let values: Vec<f32> = project(scaled, vector).map(|value| value as f32).collect();
             let may_be_wide = images.iter().all(|image| image.stored != Stored::Narrow);
-            let image = Image::new(&values, in_light(vector), vector, aim.tolerance, (may_be_wide, choice))?;
+            let image = Image::new(&values, along, vector, aim.tolerance, (may_be_wide, choice))?;
             rest.remove(&image.table, &image.decoded);
-            rest.remove_noise(vector, vector, weights);
+            rest.remove_noise(vector, weights);
             images.push(image);
             state = rest.state(aim.tolerance);
         }
@@ -191,72 +182,4 @@ fn keep_means(images: &mut [Image], rest: &mut Rest, light: Measured<'_>) {
     let added: Vec<f32> = changed.iter().zip(&first.table).map(|(new, old)| new - old).collect();
     rest.remove(&added, &first.decoded);
     first.table = changed;
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::techniques::daylight::gathered::Coded;
-
-    const TIMES: usize = 40;
-    const TEXELS: usize = 500;
-    /// The last texels are dim.
-    const BRIGHT: usize = 450;
-
-    /// Bright texels in the light of a morning, and dim ones in that of an evening, with much noise: rows, and half the difference of two halves.
-    fn beside_each_other() -> (Vec<f32>, Vec<f32>) {
-        let mut state = 15u64;
-        let mut next = || {
-            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
-            (state >> 40) as f32 / (1u64 << 23) as f32 - 1.0
-        };
-        let (mut rows, mut noises) = (Vec::new(), Vec::new());
-        for texel in (0..TEXELS).flat_map(|texel| [texel; 3]) {
-            for t in 0..TIMES {
-                let x = (t as f32 + 0.5) / TIMES as f32;
-                let light = if texel < BRIGHT { (1.0 - x).powi(3) + 0.05 } else { 0.03 * x * x };
-                let [a, b] = [(); 2].map(|()| 2.0 * light * next());
-                rows.push(light + 0.5 * (a + b));
-                noises.push(0.5 * (a - b));
-            }
-        }
-        (rows, noises)
-    }
-
-    /// The light of the dim texels, each time relative to its mean.
-    fn of_dim(rows: &[f32]) -> f64 {
-        let mean = |t: usize| rows.iter().skip(t).step_by(TIMES).map(|value| f64::from(*value)).sum::<f64>();
-        let dim = &rows[3 * BRIGHT * TIMES..];
-        (0..TIMES).map(|t| dim.iter().skip(t).step_by(TIMES).map(|v| f64::from(*v)).sum::<f64>() / mean(t)).sum()
-    }
-
-    #[test]
-    fn dim_texels_keep_their_light_beside_bright_ones_where_noise_hides_it() {
-        let (rows, noise) = beside_each_other();
-        let light = Measured { dimensions: TIMES, rows: &rows, noise: &noise };
-        let aim = Aim { tolerance: 0.02, most: TIMES };
-        let layer = Layer::compress(light, Columns::Dimensions, aim).unwrap();
-        assert!(layer.images() < 12, "{}", layer.images());
-        let mut decoded = vec![0.0f32; rows.len()];
-        for t in 0..TIMES {
-            let coefficients = layer.mix([(t, [1.0; 3])].into_iter());
-            for texel in 0..TEXELS {
-                for (channel, value) in layer.decode(texel, &coefficients).into_iter().enumerate() {
-                    decoded[(3 * texel + channel) * TIMES + t] = value;
-                }
-            }
-        }
-        let coded = Coded::new(light, Columns::Dimensions, 0.02, false).unwrap();
-        let mut restored = Vec::new();
-        let [mut mean, mut of_noise] = [(); 2].map(|()| vec![0.0; 3 * TIMES]);
-        for texel in 0..TEXELS {
-            coded.restore(texel, &mut mean, &mut of_noise);
-            restored.extend_from_slice(&mean);
-        }
-        for (of, found) in [("coded", of_dim(&restored)), ("compressed", of_dim(&decoded))] {
-            let ratio = found / of_dim(&rows);
-            println!("{of}: {ratio:.4}");
-            assert!((ratio - 1.0).abs() < 0.02, "{of}: {ratio}");
-        }
-    }
 }

@@ -7,7 +7,7 @@ use half::f16;
 
 use super::{
     Baking, Light, Plan,
-    columns::{Columns, Measured, Rest, Weighted, deflate, level, project, times},
+    columns::{Columns, Measured, Rest, Weighted, level, project, times},
 };
 use crate::{Error, Result};
 
@@ -110,28 +110,10 @@ impl Coded {
             return Ok(none);
         }
         let most = if exact { light.dimensions } else { MOST };
-        let Weighted { scaled, mean, basis } = Weighted::new(light, columns, &weights, most)?;
-        let mut noise = times(all_noise, &weights);
+        let Weighted { scaled, basis } = Weighted::new(light, &weights, most)?;
+        let noise = times(all_noise, &weights);
         let mut rest = Rest::new(light, columns);
         let (mut vectors, mut coefficients): (Vec<f32>, Vec<[Vec<f16>; 2]>) = (Vec::new(), Vec::new());
-        let mut take = |rest: &mut Rest, [of_light, of_noise]: [Vec<f64>; 2], of: &[f64], vector: &[f64]| {
-            // Near 1, where 16-bit floats are most precise.
-            let largest = of_light.iter().chain(&of_noise).fold(1e-30f64, |most, value| most.max(value.abs()));
-            let unscaled = |(v, w): (&f64, &f64)| if *w > 0.0 { (v / w * largest) as f32 } else { 0.0 };
-            let along: Vec<f32> = vector.iter().zip(&weights).map(unscaled).collect();
-            let bits = |values: Vec<f64>| values.into_iter().map(|v| f16::from_f64(v / largest)).collect::<Vec<f16>>();
-            let [of_light, of_noise] = [bits(of_light), bits(of_noise)];
-            let decoded: Vec<f32> = of_light.iter().map(|value| value.to_f32()).collect();
-            rest.remove(&along, &decoded);
-            rest.remove_noise(of, vector, &weights);
-            vectors.extend(along);
-            coefficients.push([of_light, of_noise]);
-        };
-        if let Some(mean) = &mean {
-            let of_noise: Vec<f64> = project(&noise, &mean.of).collect();
-            deflate(&mut noise, &of_noise, &mean.vector);
-            take(&mut rest, [mean.values.clone(), of_noise], &mean.of, &mean.vector);
-        }
         for index in 0..basis.len() {
             // Vectors that are no larger than those of noise alone are left out. The filter finds light that is below the noise of one tile, so
             // all larger ones are kept.
@@ -140,8 +122,18 @@ impl Coded {
                 break;
             }
             let vector = basis.vector(index);
-            let values = [&scaled, &noise].map(|rows| project(rows, vector).collect());
-            take(&mut rest, values, vector, vector);
+            let [of_light, of_noise]: [Vec<f64>; 2] = [&scaled, &noise].map(|rows| project(rows, vector).collect());
+            // Near 1, where 16-bit floats are most precise.
+            let largest = of_light.iter().chain(&of_noise).fold(1e-30f64, |most, value| most.max(value.abs()));
+            let unscaled = |(v, w): (&f64, &f64)| if *w > 0.0 { (v / w * largest) as f32 } else { 0.0 };
+            let along: Vec<f32> = vector.iter().zip(&weights).map(unscaled).collect();
+            let bits = |values: Vec<f64>| values.into_iter().map(|v| f16::from_f64(v / largest)).collect::<Vec<f16>>();
+            let [of_light, of_noise] = [bits(of_light), bits(of_noise)];
+            let decoded: Vec<f32> = of_light.iter().map(|value| value.to_f32()).collect();
+            rest.remove(&along, &decoded);
+            rest.remove_noise(vector, &weights);
+            vectors.extend(along);
+            coefficients.push([of_light, of_noise]);
         }
         let decoded: Vec<Vec<f32>> =
             coefficients.iter().map(|[of_light, _]| of_light.iter().map(|value| value.to_f32()).collect()).collect();
